@@ -1,0 +1,1 @@
+"""Control laws, their common interface and registry."""

@@ -1,0 +1,1 @@
+"""Formations, target propagation, slot assignment."""

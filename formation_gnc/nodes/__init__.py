@@ -1,0 +1,1 @@
+"""The ROS shell: thin nodes over the core."""

@@ -1,0 +1,1 @@
+"""Orbits: frames, elements, force models, propagation."""

@@ -1,0 +1,1 @@
+"""Truth of chief and deputies, sensors, thrusters."""

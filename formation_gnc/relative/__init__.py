@@ -1,0 +1,1 @@
+"""Relative-motion models, one file per model."""

@@ -1,0 +1,1 @@
+"""Scenarios and the in-process runner."""

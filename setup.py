@@ -1,0 +1,31 @@
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+NAME = "formation_gnc"
+NODES = ["plant", "navigation", "guidance", "controller", "recorder"]
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    packages=find_packages(include=[NAME, f"{NAME}.*"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}/params", sorted(str(path) for path in Path("params").glob("*.yaml"))),
+        (f"share/{NAME}/launch", sorted(str(path) for path in Path("launch").glob("*.py"))),
+    ],
+    install_requires=["setuptools"],
+    zip_safe=True,
+    maintainer="formation_gnc maintainers",
+    maintainer_email="maintainers@example.org",
+    description="Guidance, navigation and control of satellites in formation, as a lock-step ROS 2 node graph.",
+    license="Apache-2.0",
+    extras_require={"test": ["pytest"]},
+    entry_points={
+        "console_scripts": [
+            *(f"{node} = {NAME}.nodes.{node}:main" for node in NODES),
+            f"formation-gnc = {NAME}.cli:main",
+        ]
+    },
+)
