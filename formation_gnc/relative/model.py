@@ -123,7 +123,7 @@ def integrate(
     """Value after `duration` (either sign) of d(value)/dt = rate(t, value), in equal steps.
 
     Dormand and Prince's method of order 8 (the tableau of SciPy's DOP853) with fixed steps: the same call
-    gives the same bits, and the result is a smooth function of its arguments, which step control would not allow.
+    gives the same bits, smooth in its arguments; step control would give neither.
     """
     if duration == 0.0:
         return value

@@ -14,17 +14,21 @@ motions = st.floats(7e-5, 1.2e-3)  # GEO to the lowest orbits
 durations = st.floats(-2e4, 2e4)
 
 
-@given(motions, durations, st.floats(-1e4, 1e4))
-def test_transition_and_forcing_are_the_matrix_exponential(mean_motion, duration, later):
-    model = HillModel(mean_motion)
+@given(motions, st.floats(-25.0, 25.0), st.floats(-1e4, 1e4))
+def test_transition_and_forcing_are_the_matrix_exponential(mean_motion, angle, later):
+    # Compared in units of 1 / n, where all entries are of one size.
     joint = np.zeros((9, 9))
-    joint[:6, :6] = model.dynamics()
+    joint[:6, :6] = HillModel(1.0).dynamics()
     joint[:6, 6:] = INPUT
-    expected = expm(joint * duration)
-    free, forced = model.discretise(later, duration)
-    # expm itself is good to about 1e-10 of the largest entry at |A t| of order 1e4.
-    np.testing.assert_allclose(free, expected[:6, :6], rtol=1e-8, atol=1e-9 * np.abs(free).max())
-    np.testing.assert_allclose(forced, expected[:6, 6:], rtol=1e-8, atol=1e-9 * np.abs(forced).max())
+    expected = expm(joint * angle)
+    free, forced = HillModel(mean_motion).discretise(later, angle / mean_motion)
+    unit = np.repeat([1.0, mean_motion], 3)
+    # The exponential's own error over four orbits, relative to its largest entry.
+    tolerance = 1e-11 * np.abs(expected).max()
+    np.testing.assert_allclose(free * unit / unit[:, None], expected[:6, :6], rtol=0.0, atol=tolerance)
+    np.testing.assert_allclose(
+        forced * mean_motion**2 / unit[:, None], expected[:6, 6:], rtol=0.0, atol=tolerance
+    )
 
 
 @given(motions, durations, durations)
