@@ -1,0 +1,83 @@
+"""The Earth's attraction as a point mass with J2, and its gradient: what the navigation filter flies with."""
+
+from math import sqrt
+
+import numba
+import numpy as np
+from numba import float64
+from numpy.typing import NDArray
+
+from formation_gnc.orbit.constants import EARTH_RADIUS, J2, MU
+from formation_gnc.orbit.jit import inline, kernel
+
+ANY_VECTOR = numba.types.Array(float64, 1, "A", readonly=True)
+"""Numba type of a vector argument, contiguous or not, writable or not."""
+
+_J2_STRENGTH = 1.5 * J2 * MU * EARTH_RADIUS**2
+
+
+@inline
+def oblate_acceleration(x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Acceleration of the point mass with J2, component-wise, m/s^2."""
+    r2 = x * x + y * y + z * z
+    r = sqrt(r2)
+    central = MU / (r2 * r)
+    oblate = _J2_STRENGTH / (r2 * r2 * r)
+    polar = 5.0 * z * z / r2
+    equatorial = -(central + oblate * (1.0 - polar))
+    return x * equatorial, y * equatorial, -z * (central + oblate * (3.0 - polar))
+
+
+@inline
+def oblate_gradient(x: float, y: float, z: float) -> tuple[float, float, float, float, float, float]:
+    """Gradient of `oblate_acceleration`: its components xx, xy, xz, yy, yz, zz, 1/s^2."""
+    r2 = x * x + y * y + z * z
+    r = sqrt(r2)
+    r5 = r2 * r2 * r
+    central = MU / r5
+    oblate = _J2_STRENGTH / (r5 * r2)
+    z2 = z * z
+    outer = 3.0 * central + oblate * (5.0 - 35.0 * z2 / r2)
+    diagonal = -central * r2 - oblate * (r2 - 5.0 * z2)
+    return (
+        diagonal + outer * x * x,
+        outer * x * y,
+        (outer + 10.0 * oblate) * x * z,
+        diagonal + outer * y * y,
+        (outer + 10.0 * oblate) * y * z,
+        -central * r2 - oblate * (3.0 * r2 - 5.0 * z2) + (outer + 20.0 * oblate) * z2,
+    )
+
+
+@kernel(float64[::1](ANY_VECTOR))
+def acceleration(position: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Acceleration of the point mass with J2.
+
+    Args:
+        position: inertial, (3,), m; the first three of a state will do.
+
+    Returns:
+        (3,), m/s^2, inertial.
+    """
+    out = np.empty(3)
+    out[0], out[1], out[2] = oblate_acceleration(position[0], position[1], position[2])
+    return out
+
+
+@kernel(float64[:, ::1](ANY_VECTOR))
+def gradient(position: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Gradient of `acceleration` with respect to position; symmetric and without trace.
+
+    Args:
+        position: inertial, (3,), m.
+
+    Returns:
+        (3, 3), 1/s^2, inertial.
+    """
+    xx, xy, xz, yy, yz, zz = oblate_gradient(position[0], position[1], position[2])
+    out = np.empty((3, 3))
+    out[0, 0], out[1, 1], out[2, 2] = xx, yy, zz
+    out[0, 1] = out[1, 0] = xy
+    out[0, 2] = out[2, 0] = xz
+    out[1, 2] = out[2, 1] = yz
+    return out

@@ -1,0 +1,68 @@
+"""Compilation of the hot loops, cached on disk so that a process starts fast.
+
+Numba checks a cached function against its own source file only, and would go on using a kernel whose callees
+in another file have changed. So the cache of this package is keyed by the content of all its sources.
+Concurrent processes are safe: numba replaces files atomically, and an explicit signature leaves one entry per
+function.
+"""
+
+import os
+import tempfile
+from collections.abc import Callable
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numba
+
+_HERE = Path(__file__).resolve().parent
+
+
+def _cache_directory() -> str:
+    """First writable place for compiled code, or an empty string when there is none."""
+    digest = sha256()
+    for source in sorted(_HERE.rglob("*.py")):
+        digest.update(source.read_bytes())
+    user_cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    for root in (numba.config.CACHE_DIR, _HERE / "__pycache__", user_cache / "formation_gnc"):
+        if not root:
+            continue
+        directory = Path(root) / f"kernels-{digest.hexdigest()[:16]}"
+        try:
+            directory.mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=directory).close()
+        except OSError:
+            continue
+        return str(directory)
+    return ""
+
+
+_CACHE = _cache_directory()
+
+
+def kernel(signature: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Compile a function, when its module is imported, for exactly this signature.
+
+    Without fastmath and threads: the same input gives the same bits. Division by zero follows IEEE 754.
+
+    Args:
+        signature: numba signature; arguments of other types are refused, layouts are as declared.
+    """
+
+    def compile_function(function: Callable[..., Any]) -> Callable[..., Any]:
+        previous, numba.config.CACHE_DIR = numba.config.CACHE_DIR, _CACHE
+        try:
+            compiled: Callable[..., Any] = numba.njit(signature, cache=bool(_CACHE), error_model="numpy")(
+                function
+            )
+        finally:
+            numba.config.CACHE_DIR = previous
+        return compiled
+
+    return compile_function
+
+
+def inline(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a function for use inside kernels: scalars and tuples in, scalars and tuples out."""
+    compiled: Callable[..., Any] = numba.njit(error_model="numpy")(function)
+    return compiled
