@@ -88,7 +88,7 @@ def test_singular_orbits_follow_the_convention(state, expected):
 def test_vallado_example_of_state_to_elements():
     """Vallado, Fundamentals of Astrodynamics, example 2-5 (his gravity, his digits).
 
-    His perigee lies below the surface, so the orbit is flown ten times larger about a 1000 times heavier body.
+    His perigee lies below the surface, so the orbit is flown ten times larger about a 1000 times heavier one.
     """
     state = np.array([6524.834, 6862.875, 6448.296, 4.901327, 5.533756, -1.976341]) * 1e4
     found = elements_from_state(state, mu=3.986004418e17)
