@@ -1,0 +1,27 @@
+"""No thrust."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from formation_gnc.control.controller import Command, Controller, Vehicle
+from formation_gnc.interface import Estimate, Target
+from formation_gnc.mission import Mission
+
+
+@dataclass(frozen=True)
+class CoastParameters:
+    """Coasting has nothing to set."""
+
+
+class Coast(Controller):
+    """Free flight: commands no thrust, whatever the error."""
+
+    Parameters = CoastParameters
+
+    def __init__(self, parameters: CoastParameters, mission: Mission, vehicle: Vehicle) -> None:
+        """Nothing to design."""
+
+    def command(self, estimate: Estimate, target: Target) -> Command:
+        """No force."""
+        return Command(np.zeros(3))

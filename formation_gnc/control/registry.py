@@ -1,0 +1,10 @@
+"""All control laws by name: a new law is one file and one line here."""
+
+from formation_gnc.control.coast import Coast
+from formation_gnc.control.controller import Controller
+from formation_gnc.control.lqr import LinearQuadraticRegulator
+
+ALGORITHMS: dict[str, type[Controller]] = {
+    "coast": Coast,
+    "lqr": LinearQuadraticRegulator,
+}

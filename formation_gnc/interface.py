@@ -1,0 +1,131 @@
+"""What the parts of the system hand to one another at a tick.
+
+Each class mirrors the message of the same name in ``msg_defs/``, where units and frames are given; `time` is
+the message's stamp in nanoseconds of simulated time. The core speaks these, the ROS shell translates them.
+"""
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+NANOSECONDS = 1_000_000_000
+
+
+class Sensor(IntEnum):
+    """What a reading measures; the constants of Measurement.msg."""
+
+    RADIUS = 0
+    RANGE_RATE = 1
+    LATITUDE = 2
+    RIGHT_ASCENSION = 3
+    CHIEF_RANGE = 4
+
+
+class EstimateStatus(IntEnum):
+    """State of the filter; the constants of Estimate.msg."""
+
+    TRACKING = 0
+    ACQUIRED = 1
+
+
+@dataclass(slots=True)
+class Measurement:
+    """What one deputy knows at a tick before it thinks."""
+
+    time: int
+    chief_state: Vector  # (6,)
+    sensor: list[int]
+    reading: list[float]
+    age: list[float]
+    applied_force: Vector  # (3,)
+    mass: float
+    eclipse: bool
+    fix_available: bool
+    fix: Vector  # (6,)
+
+
+@dataclass(slots=True)
+class Estimate:
+    """Relative state of a deputy as its filter knows it."""
+
+    time: int
+    relative_state: Vector  # (6,)
+    covariance: Matrix = field(metadata={"shape": (6, 6)})
+    chief_state: Vector  # (6,)
+    mass: float
+    eclipse: bool
+    sensor: list[int]
+    innovation: list[float]
+    innovation_sigma: list[float]
+    nis: float
+    status: int
+
+
+@dataclass(slots=True)
+class Target:
+    """Relative state that a deputy is to have, now and over the horizon."""
+
+    time: int
+    formation: str
+    relative_state: Vector  # (6,)
+    preview_step: float
+    preview: Matrix = field(metadata={"shape": (-1, 6)})
+
+
+@dataclass(slots=True)
+class Thrust:
+    """Force the thrusters are to give until the next tick, Hill frame, N."""
+
+    time: int
+    force: Vector  # (3,)
+
+
+@dataclass(slots=True)
+class Status:
+    """How the controller came to its command."""
+
+    time: int
+    algorithm: str
+    demand: Vector  # (3,)
+    saturated: list[bool]
+    solver: str = ""
+    iterations: int = 0
+    cost: float = 0.0
+    fallback: str = ""
+
+
+@dataclass(slots=True)
+class SatelliteTruth:
+    """True state of one deputy."""
+
+    name: str
+    inertial_state: Vector  # (6,)
+    relative_state: Vector  # (6,)
+    applied_force: Vector  # (3,)
+    mass: float
+    eclipse: bool
+
+
+@dataclass(slots=True)
+class Truth:
+    """What really is."""
+
+    time: int
+    chief_state: Vector  # (6,)
+    deputies: list[SatelliteTruth]
+
+
+@dataclass(slots=True)
+class Event:
+    """Something that happened to the run."""
+
+    time: int
+    tick: int
+    node: str
+    kind: str
+    detail: str

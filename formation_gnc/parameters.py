@@ -1,0 +1,184 @@
+"""One typed schema per node for its parameters.
+
+A schema is a frozen dataclass whose fields are made with :func:`parameter`. Declaration as ROS parameters,
+checks, YAML defaults and the reference page all come from it. Nested schemas become dotted names; a field
+made with :func:`per_name` holds one nested schema for every name that another field lists, and those names
+are the prefix: ``deputy1.mass``.
+"""
+
+import dataclasses
+import difflib
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import MISSING, dataclass
+from typing import Any, get_args, get_origin, get_type_hints
+
+from formation_gnc.errors import ConfigurationError
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a parameter means and which values it may take."""
+
+    doc: str
+    unit: str = ""
+    minimum: float = -math.inf
+    above: float = -math.inf
+    maximum: float = math.inf
+    choices: tuple[str, ...] = ()
+    length: int | None = None
+    in_flight: bool = False
+
+    def allowed(self) -> str:
+        """Say in words which values are allowed."""
+        words = []
+        if self.choices:
+            words.append("one of " + ", ".join(self.choices))
+        if self.length is not None:
+            words.append(f"{self.length} values")
+        if self.above > -math.inf:
+            words.append(f"above {self.above:g}")
+        if self.minimum > -math.inf:
+            words.append(f"at least {self.minimum:g}")
+        if self.maximum < math.inf:
+            words.append(f"at most {self.maximum:g}")
+        return ", ".join(words)
+
+
+def parameter(default: Any = MISSING, **limits: Any) -> Any:
+    """Declare one parameter: its default (none: it must be given) and its :class:`Limits` by keyword."""
+    return dataclasses.field(default=default, metadata={"limits": Limits(**limits)})
+
+
+def per_name(names: str) -> Any:
+    """Declare a dict of nested schemas, one for each name in the parameter `names`."""
+    return dataclasses.field(default_factory=dict, metadata={"names": names})
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """One parameter with its full dotted name, its Python type and default."""
+
+    name: str
+    type: Any
+    default: Any
+    limits: Limits
+
+    @property
+    def type_name(self) -> str:
+        """The type as a ROS 2 user knows it."""
+        scalar = {bool: "bool", int: "integer", float: "double", str: "string"}
+        if get_origin(self.type) is tuple:
+            return f"{scalar[get_args(self.type)[0]]} array"
+        return scalar[self.type]
+
+    def check(self, value: Any) -> Any:
+        """Return `value` in the parameter's own type, or raise ConfigurationError saying what is allowed."""
+        if get_origin(self.type) is not tuple:
+            return self._check_scalar(value, self.type)
+        if isinstance(value, str) or not hasattr(value, "__iter__"):
+            raise self._refusal(value, f"a list ({self.type_name})")
+        values = tuple(self._check_scalar(item, get_args(self.type)[0]) for item in value)
+        if self.limits.length is not None and len(values) != self.limits.length:
+            raise self._refusal(list(value), self.limits.allowed())
+        return values
+
+    def _check_scalar(self, value: Any, kind: type) -> Any:
+        if kind is float and isinstance(value, int) and not isinstance(value, bool):
+            value = float(value)
+        if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
+            raise self._refusal(value, f"a value of type {self.type_name}")
+        if isinstance(value, float) and not math.isfinite(value):
+            raise self._refusal(value, "finite")
+        limits = self.limits
+        if limits.choices and value not in limits.choices:
+            raise self._refusal(value, limits.allowed())
+        if kind in (int, float) and not (limits.minimum <= value <= limits.maximum and value > limits.above):
+            raise self._refusal(value, limits.allowed())
+        return value
+
+    def _refusal(self, value: Any, allowed: str) -> ConfigurationError:
+        return ConfigurationError(f"parameter {self.name}: {value!r} is not allowed; it must be {allowed}")
+
+
+def leaves(schema: type, values: Mapping[str, Any], prefix: str = "") -> Iterator[Leaf]:
+    """Every parameter of a schema, in order; `values` (dotted names) tells which names `per_name` has."""
+    hints = get_type_hints(schema)
+    for field in dataclasses.fields(schema):
+        kind, name = hints[field.name], prefix + field.name
+        if "names" in field.metadata:
+            source = field.metadata["names"]
+            listed = values.get(prefix + source, schema.__dataclass_fields__[source].default)
+            for key in listed if isinstance(listed, list | tuple) else ():
+                yield from leaves(get_args(kind)[1], values, f"{prefix}{key}.")
+        elif dataclasses.is_dataclass(kind):
+            yield from leaves(kind, values, f"{name}.")  # type: ignore[arg-type]
+        else:
+            yield Leaf(name, kind, field.default, field.metadata["limits"])
+
+
+def load[T](schema: type[T], values: Mapping[str, Any]) -> T:
+    """Build a schema's instance from dotted names.
+
+    Raises:
+        ConfigurationError: unknown, missing, mistyped, out of range or not finite; the message names the
+            parameter, the value and what is allowed.
+    """
+    known = {leaf.name: leaf for leaf in leaves(schema, values)}
+    for name in values:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
+            hint = f"did you mean {near[0]}?" if near else "known: " + ", ".join(sorted(known))
+            raise ConfigurationError(f"parameter {name}: unknown; {hint}")
+    checked = {}
+    for leaf in known.values():
+        if leaf.name in values:
+            checked[leaf.name] = leaf.check(values[leaf.name])
+        elif leaf.default is MISSING:
+            raise ConfigurationError(f"parameter {leaf.name}: missing; give a {leaf.type_name}")
+        else:
+            checked[leaf.name] = leaf.default
+    return _build(schema, checked, "")
+
+
+def _build[T](schema: type[T], checked: Mapping[str, Any], prefix: str) -> T:
+    hints = get_type_hints(schema)
+    fields: dict[str, Any] = {}
+    for field in dataclasses.fields(schema):  # type: ignore[arg-type]
+        kind, name = hints[field.name], prefix + field.name
+        if "names" in field.metadata:
+            keys = fields[field.metadata["names"]]
+            fields[field.name] = {key: _build(get_args(kind)[1], checked, f"{prefix}{key}.") for key in keys}
+        elif dataclasses.is_dataclass(kind):
+            fields[field.name] = _build(kind, checked, f"{name}.")
+        else:
+            fields[field.name] = checked[name]
+    return schema(**fields)
+
+
+def dump(instance: Any, prefix: str = "") -> dict[str, Any]:
+    """The dotted names and values of an instance: the inverse of :func:`load`."""
+    flat: dict[str, Any] = {}
+    for field in dataclasses.fields(instance):
+        value = getattr(instance, field.name)
+        if "names" in field.metadata:
+            for key, nested in value.items():
+                flat |= dump(nested, f"{prefix}{key}.")
+        elif dataclasses.is_dataclass(value):
+            flat |= dump(value, f"{prefix}{field.name}.")
+        else:
+            flat[prefix + field.name] = value
+    return flat
+
+
+def change[T](instance: T, changes: Mapping[str, Any]) -> T:
+    """A copy of `instance` with parameters changed in flight.
+
+    Raises:
+        ConfigurationError: as :func:`load`, or a parameter that may not change in flight.
+    """
+    values = dump(instance)
+    for leaf in leaves(type(instance), values):
+        if leaf.name in changes and not leaf.limits.in_flight and changes[leaf.name] != values[leaf.name]:
+            raise ConfigurationError(f"parameter {leaf.name}: cannot change in flight; set it at the start")
+    return load(type(instance), values | dict(changes))

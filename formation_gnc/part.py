@@ -1,0 +1,131 @@
+"""A part of a satellite's software whose parameters change in flight, at a tick."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import yaml
+
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.interface import NANOSECONDS, Event
+from formation_gnc.mission import Mission
+from formation_gnc.parameters import change, dump, parameter
+
+
+@dataclass(frozen=True)
+class Schedulable(Mission):
+    """Parameters of a part, and changes of them foreseen for given times."""
+
+    schedule: tuple[str, ...] = parameter(
+        (), doc="changes in flight, each `{at: SECONDS, PARAMETER: VALUE, ...}`, taking effect at the first tick from then on"
+    )
+
+
+@dataclass(frozen=True)
+class Configuration[P, D]:
+    """Parameters together with what was designed from them."""
+
+    parameters: P
+    design: D
+    changes: Mapping[str, Any]
+
+
+class Part[P: Schedulable, D](ABC):
+    """Navigation, guidance or control of one deputy: parameters, what is designed from them, and swaps.
+
+    A change goes in two steps. `prepare` checks it and designs, which may be slow, touches nothing and may run in another
+    thread; `adopt` hands the result over, and it takes effect when the next tick begins.
+    """
+
+    def __init__(self, name: str, parameters: P) -> None:
+        """Design from `parameters` and from every change they schedule; `name` is the node's full name.
+
+        Raises:
+            ConfigurationError: a design fails, or a scheduled change is not allowed.
+        """
+        self.name = name
+        self.events: list[Event] = []
+        self.configuration: Configuration[P, D] = Configuration(parameters, self.design(parameters), {})
+        self._pending: Configuration[P, D] | None = None
+        self._foreseen: list[tuple[int, Configuration[P, D]]] = []
+        latest = self.configuration
+        for at, changes in sorted(map(_scheduled, parameters.schedule), key=lambda entry: entry[0]):
+            latest = self.prepare(changes, base=latest)
+            self._foreseen.append((at, latest))
+
+    @abstractmethod
+    def design(self, parameters: P) -> D:
+        """What flies with these parameters; raises ConfigurationError when nothing can."""
+
+    def take_over(self, old: Configuration[P, D], new: Configuration[P, D]) -> None:  # noqa: B027 - optional
+        """Hand the state of the old design to the new one; called at the tick where it takes over."""
+
+    @property
+    def parameters(self) -> P:
+        """The parameters in force."""
+        return self.configuration.parameters
+
+    def prepare(
+        self, changes: Mapping[str, Any], base: Configuration[P, D] | None = None
+    ) -> Configuration[P, D]:
+        """Check a change of parameters and design from it, without effect yet.
+
+        Raises:
+            ConfigurationError: the change is not allowed, or the design fails; nothing has changed.
+        """
+        if "schedule" in changes:
+            raise ConfigurationError("parameter schedule: cannot change in flight; set it at the start")
+        parameters = change((base or self._pending or self.configuration).parameters, changes)
+        return Configuration(parameters, self.design(parameters), dict(changes))
+
+    def adopt(self, prepared: Configuration[P, D]) -> None:
+        """Let a prepared configuration take over when the next tick begins."""
+        self._pending = prepared
+
+    def begin_tick(self, time: int) -> None:
+        """Let a change take over that is due at this tick: first a scheduled one, then an adopted one."""
+        while self._foreseen and self._foreseen[0][0] <= time:
+            _, due = self._foreseen.pop(0)
+            # What was designed beforehand holds only if nothing else was changed in the meantime.
+            self._swap(time, due if self._follows(due) else self.prepare(due.changes, base=self.configuration))
+        if self._pending is not None:
+            pending, self._pending = self._pending, None
+            self._swap(time, pending)
+
+    def _follows(self, due: Configuration[P, D]) -> bool:
+        return change(self.parameters, due.changes) == due.parameters
+
+    def _swap(self, time: int, new: Configuration[P, D]) -> None:
+        old, self.configuration = self.configuration, new
+        self.take_over(old, new)
+        before = dump(old.parameters)
+        detail = ", ".join(f"{name}: {_text(before[name])} -> {_text(value)}" for name, value in new.changes.items())
+        self.record(time, "parameters", detail)
+
+    def record(self, time: int, kind: str, detail: str) -> None:
+        """Note an event of this part, to be published with the tick's output."""
+        self.events.append(Event(time, time // self.parameters.tick_ns, self.name, kind, detail))
+
+    def take_events(self) -> list[Event]:
+        """The events noted since they were last taken."""
+        events, self.events = self.events, []
+        return events
+
+
+def _scheduled(entry: str) -> tuple[int, dict[str, Any]]:
+    try:
+        changes = yaml.safe_load(entry)
+        at = changes.pop("at")
+        return round(float(at) * NANOSECONDS), changes
+    except (yaml.YAMLError, AttributeError, KeyError, TypeError, ValueError):
+        raise ConfigurationError(
+            f"parameter schedule: {entry!r} is not allowed; "
+            "it must be like '{at: 3000.0, algorithm: coast}' with the time in seconds"
+        ) from None
+
+
+def _text(value: Any) -> str:
+    return str(list(value)) if isinstance(value, tuple) else str(value)
+
+
