@@ -12,6 +12,10 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
+        (
+            "bin",
+            ["scripts/formation-gnc"],
+        ),  # on PATH in an environment that colcon sets up; the nodes are not
         (f"share/{NAME}/params", sorted(str(path) for path in Path("params").glob("*.yaml"))),
         (f"share/{NAME}/launch", sorted(str(path) for path in Path("launch").glob("*.py"))),
     ],
@@ -22,10 +26,5 @@ setup(
     description="Guidance, navigation and control of satellites in formation, as a lock-step ROS 2 node graph.",
     license="Apache-2.0",
     extras_require={"test": ["pytest"]},
-    entry_points={
-        "console_scripts": [
-            *(f"{node} = {NAME}.nodes.{node}:main" for node in NODES),
-            f"formation-gnc = {NAME}.cli:main",
-        ]
-    },
+    entry_points={"console_scripts": [f"{node} = {NAME}.nodes.{node}:main" for node in NODES]},
 )

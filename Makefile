@@ -1,0 +1,62 @@
+# Every target does all its own set-up, again and again without harm.
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+
+in_environment := source ./env.sh &&
+
+.PHONY: help setup demo test check bench verify lock clean force
+
+help:
+	@echo "make demo    fly the default scenario on the node graph, and record it"
+	@echo "make test    lint, types and the test suite"
+	@echo "make check   lint and types"
+	@echo "make bench   measure speed, into build/bench.json"
+	@echo "make verify  long runs against independent programs, into docs/verification/"
+	@echo "make setup   the environment alone; then: source env.sh"
+	@echo "make lock    pin the newest versions that requirements*.in allow (takes uv)"
+	@echo "make clean   remove what was built; .venv and bags/ stay"
+
+setup: install/.ready
+
+demo: setup
+	@$(in_environment) formation-gnc sil leader_follower
+
+check: setup
+	@$(in_environment) ruff check . && ruff format --check . && mypy
+
+test: check
+	@$(in_environment) python -m pytest -m "not slow"
+
+bench: setup
+	@$(in_environment) python -m bench
+
+verify: .venv/.verify
+	@$(in_environment) python -m pytest -m slow && python -m verification
+
+# Which ROS, and for which place: a change of either is a new environment.
+.ros: force
+	@ros=$$(tools/find_ros.sh) && line="$$ros for $(CURDIR)" && [[ $$line == "$$(cat $@ 2>/dev/null)" ]] || echo "$$line" > $@
+
+.venv/.ready: .ros requirements.lock tools/make_venv.sh tools/ros_prefix.py
+	@tools/make_venv.sh
+	@touch $@
+
+.venv/.verify: install/.ready requirements-verify.lock
+	@.venv/bin/python -m pip install -qq --disable-pip-version-check --require-hashes --no-deps -r requirements-verify.lock
+	@touch $@
+
+# Python files are linked, not copied, so that a change to one needs no build; messages, data files and entry points do.
+install/.ready: .venv/.ready tools/build.sh package.xml setup.py setup.cfg msg_defs/package.xml msg_defs/CMakeLists.txt \
+		$(wildcard msg_defs/msg msg_defs/msg/*.msg params params/* launch launch/* scripts/*)
+	@tools/build.sh
+	@touch $@
+
+lock := uv pip compile --python-version 3.12 --only-binary :all: --no-binary empy --generate-hashes --no-annotate \
+	--custom-compile-command "make lock" --upgrade --quiet
+lock:
+	$(lock) requirements.in -o requirements.lock
+	$(lock) requirements-verify.in -c requirements.lock -o requirements-verify.lock
+
+clean:
+	rm -rf build install log .mypy_cache .pytest_cache .ruff_cache .hypothesis
