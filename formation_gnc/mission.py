@@ -1,9 +1,11 @@
 """What every node of a run is told alike."""
 
 from dataclasses import dataclass
+from math import sqrt
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.interface import NANOSECONDS
+from formation_gnc.orbit.constants import MU
 from formation_gnc.parameters import parameter
 
 
@@ -37,3 +39,8 @@ class Mission:
     def tick_ns(self) -> int:
         """The tick in nanoseconds."""
         return round(self.tick * NANOSECONDS)
+
+    @property
+    def mean_motion(self) -> float:
+        """Mean motion of the chief's two-body orbit, rad/s."""
+        return sqrt(MU / self.chief.semi_major_axis**3)

@@ -101,8 +101,14 @@ class Leaf:
         return ConfigurationError(f"parameter {self.name}: {value!r} is not allowed; it must be {allowed}")
 
 
-def leaves(schema: type, values: Mapping[str, Any], prefix: str = "") -> Iterator[Leaf]:
-    """Every parameter of a schema, in order; `values` (dotted names) tells which names `per_name` has."""
+def leaves(
+    schema: type, values: Mapping[str, Any], prefix: str = "", defaults: Any = MISSING
+) -> Iterator[Leaf]:
+    """Every parameter of a schema, in order.
+
+    `values` (dotted names) tells which names `per_name` has; the fields of the instance `defaults` go before the
+    schema's own defaults, so that two nested schemas of one kind may have different ones.
+    """
     hints = get_type_hints(schema)
     for field in dataclasses.fields(schema):
         kind, name = hints[field.name], prefix + field.name
@@ -111,10 +117,12 @@ def leaves(schema: type, values: Mapping[str, Any], prefix: str = "") -> Iterato
             listed = values.get(prefix + source, schema.__dataclass_fields__[source].default)
             for key in listed if isinstance(listed, list | tuple) else ():
                 yield from leaves(get_args(kind)[1], values, f"{prefix}{key}.")
-        elif dataclasses.is_dataclass(kind):
-            yield from leaves(kind, values, f"{name}.")  # type: ignore[arg-type]
+            continue
+        default = field.default if defaults is MISSING else getattr(defaults, field.name)
+        if dataclasses.is_dataclass(kind):
+            yield from leaves(kind, values, f"{name}.", default)  # type: ignore[arg-type]
         else:
-            yield Leaf(name, kind, field.default, field.metadata["limits"])
+            yield Leaf(name, kind, default, field.metadata["limits"])
 
 
 def load[T](schema: type[T], values: Mapping[str, Any]) -> T:

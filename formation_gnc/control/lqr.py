@@ -9,7 +9,6 @@ from formation_gnc.control.controller import Command, Controller, Vehicle
 from formation_gnc.errors import DesignError
 from formation_gnc.interface import Estimate, Matrix, Target
 from formation_gnc.mission import Mission
-from formation_gnc.orbit.constants import MU
 from formation_gnc.parameters import parameter
 from formation_gnc.relative.hill import HillModel
 
@@ -42,7 +41,7 @@ class LinearQuadraticRegulator(Controller):
 
     def __init__(self, parameters: LqrParameters, mission: Mission, vehicle: Vehicle) -> None:
         """Solve for the gain; raises DesignError when the Riccati equation has no stabilising solution."""
-        model = HillModel(mean_motion=(MU / mission.chief.semi_major_axis**3) ** 0.5)
+        model = HillModel(mission.mean_motion)
         phi, gamma = model.discretise(0.0, mission.tick)
         errors = np.array(parameters.position_error + parameters.velocity_error)
         accelerations = np.array(parameters.thrust) / vehicle.mass
