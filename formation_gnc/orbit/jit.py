@@ -40,7 +40,7 @@ def _cache_directory() -> str:
 _CACHE = _cache_directory()
 
 
-def kernel(signature: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def kernel[F: Callable[..., Any]](signature: Any) -> Callable[[F], F]:
     """Compile a function, when its module is imported, for exactly this signature.
 
     Without fastmath and threads: the same input gives the same bits. Division by zero follows IEEE 754.
@@ -49,12 +49,10 @@ def kernel(signature: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]
         signature: numba signature; arguments of other types are refused, layouts are as declared.
     """
 
-    def compile_function(function: Callable[..., Any]) -> Callable[..., Any]:
+    def compile_function(function: F) -> F:
         previous, numba.config.CACHE_DIR = numba.config.CACHE_DIR, _CACHE
         try:
-            compiled: Callable[..., Any] = numba.njit(signature, cache=bool(_CACHE), error_model="numpy")(
-                function
-            )
+            compiled: F = numba.njit(signature, cache=bool(_CACHE), error_model="numpy")(function)
         finally:
             numba.config.CACHE_DIR = previous
         return compiled
@@ -62,7 +60,7 @@ def kernel(signature: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]
     return compile_function
 
 
-def inline(function: Callable[..., Any]) -> Callable[..., Any]:
+def inline[F: Callable[..., Any]](function: F) -> F:
     """Compile a function for use inside kernels: scalars and tuples in, scalars and tuples out."""
-    compiled: Callable[..., Any] = numba.njit(error_model="numpy")(function)
+    compiled: F = numba.njit(error_model="numpy")(function)
     return compiled

@@ -1,0 +1,55 @@
+"""Solar radiation pressure on a sphere, and the Earth's shadow that interrupts it."""
+
+from math import acos, asin, pi, sqrt
+
+from formation_gnc.orbit.constants import EARTH_RADIUS
+from formation_gnc.orbit.jit import inline
+from formation_gnc.orbit.sky import ASTRONOMICAL_UNIT
+
+SOLAR_PRESSURE = 1361.0 / 299792458.0
+"""Pressure of sunlight on an absorbing surface at one astronomical unit, N/m^2 (irradiance of IAU 2015)."""
+
+SUN_RADIUS = 695.7e6
+"""Radius of the Sun, m (IAU 2015)."""
+
+
+@inline
+def illumination(sx: float, sy: float, sz: float, x: float, y: float, z: float) -> float:
+    """Fraction of the Sun's disc in view: 0 in umbra, 1 in sunlight (Montenbruck and Gill 3.4.2).
+
+    Sun at (sx, sy, sz) and satellite at (x, y, z), geocentric, m. The shadow is a cone, the Earth a sphere.
+    """
+    dx, dy, dz = sx - x, sy - y, sz - z
+    distance = sqrt(dx * dx + dy * dy + dz * dz)
+    r = sqrt(x * x + y * y + z * z)
+    if r <= EARTH_RADIUS:
+        return 0.0
+    sun = asin(SUN_RADIUS / distance)  # apparent radii and separation of the two discs
+    earth = asin(EARTH_RADIUS / r)
+    apart = acos(max(-1.0, min(1.0, -(x * dx + y * dy + z * dz) / (r * distance))))
+    if apart >= sun + earth:
+        return 1.0
+    if apart <= earth - sun:
+        return 0.0
+    if apart <= sun - earth:
+        return 1.0 - (earth / sun) ** 2
+    along = (apart * apart + sun * sun - earth * earth) / (2.0 * apart)
+    across = sqrt(max(0.0, sun * sun - along * along))
+    covered = (
+        sun * sun * acos(max(-1.0, min(1.0, along / sun)))
+        + earth * earth * acos(max(-1.0, min(1.0, (apart - along) / earth)))
+        - apart * across
+    )
+    return 1.0 - covered / (pi * sun * sun)
+
+
+@inline
+def acceleration(
+    area_to_mass: float, sx: float, sy: float, sz: float, x: float, y: float, z: float
+) -> tuple[float, float, float]:
+    """Acceleration by sunlight, m/s^2; `area_to_mass` is reflectivity times area over mass, m^2/kg."""
+    light = illumination(sx, sy, sz, x, y, z)
+    dx, dy, dz = x - sx, y - sy, z - sz
+    square = dx * dx + dy * dy + dz * dz
+    push = light * SOLAR_PRESSURE * area_to_mass * ASTRONOMICAL_UNIT**2 / (square * sqrt(square))
+    return push * dx, push * dy, push * dz

@@ -1,0 +1,101 @@
+"""Where Sun and Moon are and how far the Earth has turned: low-precision series in the J2000 frame.
+
+Time is in seconds of Terrestrial Time since J2000.0 (2000-01-01 12:00 TT), positions are geocentric. Sun and
+Moon after O. Montenbruck and E. Gill, Satellite Orbits, section 3.3.2. The Earth's axis is held along z of
+J2000: precession and nutation (0.14 deg by 2025) are left out, and universal time is taken as ``TT - 69.184
+s``, right to a second since 2017 and until the next leap second.
+"""
+
+from math import cos, floor, pi, sin, tau
+
+from formation_gnc.orbit.jit import inline
+
+ASTRONOMICAL_UNIT = 149597870700.0
+"""Metre, IAU 2012."""
+
+_CENTURY = 36525.0 * 86400.0
+_ARCSECOND = pi / 648000.0
+_COS_OBLIQUITY, _SIN_OBLIQUITY = cos(23.43929111 * pi / 180.0), sin(23.43929111 * pi / 180.0)
+_TT_MINUS_UT1 = 69.184
+
+
+@inline
+def _turn(revolutions: float) -> float:
+    return tau * (revolutions - floor(revolutions))
+
+
+@inline
+def sun(time: float) -> tuple[float, float, float]:
+    """Position of the Sun, m: within 0.02 deg from 1950 to 2050."""
+    centuries = time / _CENTURY
+    anomaly = _turn(0.9931267 + 99.9973583 * centuries)
+    centre = (6892.0 * sin(anomaly) + 72.0 * sin(2.0 * anomaly)) * _ARCSECOND
+    perigee = (
+        0.7859444 + 0.00089798 * centuries
+    )  # its drift is absent from the book's series, 0.16 deg by 2050
+    longitude = _turn(perigee) + anomaly + centre
+    distance = (149.619 - 2.499 * cos(anomaly) - 0.021 * cos(2.0 * anomaly)) * 1e9
+    across = distance * sin(longitude)
+    return distance * cos(longitude), across * _COS_OBLIQUITY, across * _SIN_OBLIQUITY
+
+
+@inline
+def moon(time: float) -> tuple[float, float, float]:
+    """Position of the Moon, m: within 0.1 deg from 1950 to 2050."""
+    centuries = time / _CENTURY
+    mean = _turn(0.606433 + 1336.851344 * centuries)  # longitude
+    l = _turn(0.374897 + 1325.552410 * centuries)  # noqa: E741  the series' own letters: anomaly of the Moon,
+    lp = _turn(0.993133 + 99.997361 * centuries)  # anomaly of the Sun,
+    d = _turn(0.827361 + 1236.853086 * centuries)  # elongation,
+    f = _turn(0.259086 + 1342.227825 * centuries)  # argument of latitude
+    change = (
+        22640.0 * sin(l)
+        - 4586.0 * sin(l - 2.0 * d)
+        + 2370.0 * sin(2.0 * d)
+        + 769.0 * sin(2.0 * l)
+        - 668.0 * sin(lp)
+        - 412.0 * sin(2.0 * f)
+        - 212.0 * sin(2.0 * l - 2.0 * d)
+        - 206.0 * sin(l + lp - 2.0 * d)
+        + 192.0 * sin(l + 2.0 * d)
+        - 165.0 * sin(lp - 2.0 * d)
+        - 125.0 * sin(d)
+        - 110.0 * sin(l + lp)
+        + 148.0 * sin(l - lp)
+        - 55.0 * sin(2.0 * f - 2.0 * d)
+    )
+    longitude = mean + change * _ARCSECOND
+    argument = f + (change + 412.0 * sin(2.0 * f) + 541.0 * sin(lp)) * _ARCSECOND
+    h = f - 2.0 * d
+    correction = (
+        -526.0 * sin(h)
+        + 44.0 * sin(l + h)
+        - 31.0 * sin(h - l)
+        - 23.0 * sin(lp + h)
+        + 11.0 * sin(h - lp)
+        - 25.0 * sin(f - 2.0 * l)
+        + 21.0 * sin(f - l)
+    )
+    latitude = (18520.0 * sin(argument) + correction) * _ARCSECOND
+    distance = (
+        385000.0
+        - 20905.0 * cos(l)
+        - 3699.0 * cos(2.0 * d - l)
+        - 2956.0 * cos(2.0 * d)
+        - 570.0 * cos(2.0 * l)
+        + 246.0 * cos(2.0 * l - 2.0 * d)
+        - 205.0 * cos(lp - 2.0 * d)
+        - 171.0 * cos(l + 2.0 * d)
+        - 152.0 * cos(l + lp - 2.0 * d)
+    ) * 1e3
+    x = distance * cos(latitude) * cos(longitude)
+    across = distance * cos(latitude) * sin(longitude)
+    up = distance * sin(latitude)
+    return x, across * _COS_OBLIQUITY - up * _SIN_OBLIQUITY, across * _SIN_OBLIQUITY + up * _COS_OBLIQUITY
+
+
+@inline
+def earth_rotation_angle(time: float) -> float:
+    """Angle from the inertial x axis to the prime meridian, rad (IERS Conventions 2010, eq. 5.15)."""
+    days = (time - _TT_MINUS_UT1) / 86400.0
+    return _turn(0.7790572732640 + 0.00273781191135448 * days + (days - floor(days)))
