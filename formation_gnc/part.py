@@ -46,6 +46,10 @@ class Part[P: Schedulable, D](ABC):
         """
         self.name = name
         self.events: list[Event] = []
+        self._start(parameters)
+
+    def _start(self, parameters: P) -> None:
+        self._time = 0
         self.configuration: Configuration[P, D] = Configuration(parameters, self.design(parameters), {})
         self._pending: Configuration[P, D] | None = None
         self._foreseen: list[tuple[int, Configuration[P, D]]] = []
@@ -84,7 +88,13 @@ class Part[P: Schedulable, D](ABC):
         self._pending = prepared
 
     def begin_tick(self, time: int) -> None:
-        """Let a change take over that is due at this tick: first a scheduled one, then an adopted one."""
+        """Let a change take over that is due at this tick: first a scheduled one, then an adopted one.
+
+        Time that runs backwards is a new run: the schedule starts again, and so does what was designed.
+        """
+        if time < self._time:
+            self._start(self.parameters)
+        self._time = time
         while self._foreseen and self._foreseen[0][0] <= time:
             _, due = self._foreseen.pop(0)
             # What was designed beforehand holds only if nothing else was changed in the meantime.

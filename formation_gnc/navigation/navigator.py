@@ -98,7 +98,7 @@ class Navigator(Part[NavigationParameters, NoiseModel]):
     def __init__(self, name: str, parameters: NavigationParameters) -> None:
         """Without a state until a fix comes."""
         super().__init__(name, parameters)
-        self._time = -1
+        self._filter_time = -1
         self._filter: RelativeFilter | None = None
 
     def design(self, parameters: NavigationParameters) -> NoiseModel:
@@ -117,14 +117,14 @@ class Navigator(Part[NavigationParameters, NoiseModel]):
     def on_tick(self, measurement: Measurement) -> Estimate | None:
         """The estimate at the measurement's stamp; none while there is no state to start from."""
         self.begin_tick(measurement.time)
-        restart = self._filter is None or measurement.time <= self._time
+        restart = self._filter is None or measurement.time <= self._filter_time
         if restart and not measurement.fix_available:
             return None
         if restart:
             self._acquire(measurement)
         else:
             self._predict(measurement)
-        self._time = measurement.time
+        self._filter_time = measurement.time
         return self._update(measurement, EstimateStatus.ACQUIRED if restart else EstimateStatus.TRACKING)
 
     def _acquire(self, measurement: Measurement) -> None:
@@ -141,7 +141,7 @@ class Navigator(Part[NavigationParameters, NoiseModel]):
         tick_ns = self.parameters.tick_ns
         tick = tick_ns / NANOSECONDS
         # Ticks that never arrived were missed ones: no thrust, and the chief flew on as the model says.
-        for _ in range((measurement.time - self._time) // tick_ns - 1):
+        for _ in range((measurement.time - self._filter_time) // tick_ns - 1):
             chief, _ = advance_with_transition(self._filter.chief_state, np.zeros(3), tick, 1)
             self._filter.fly(chief, np.zeros(3), tick)
         self._filter.fly(measurement.chief_state, measurement.applied_force / measurement.mass, tick)

@@ -137,11 +137,14 @@ class Plant:
             )
         return truth, measurements
 
-    def step(self, forces: Mapping[str, Vector]) -> None:
+    def step(self, forces: Mapping[str, Vector]) -> list[str]:
         """Fly one tick under the deputies' forces (3,), Hill frame, N.
 
         A deputy without an entry, or with a force that is not finite, missed the tick: it gets no thrust, and a fix with its next
         measurement, since it may have lost its state.
+
+        Returns:
+            Names of the deputies that missed the tick.
         """
         rotation = hill_rotation(self._states[0])
         accelerations = np.zeros((len(self._names) + 1, 3))
@@ -153,3 +156,4 @@ class Plant:
             accelerations[index + 1] = self._forces[index] @ rotation / self._masses[index]
         self._states = self._propagator.advance(self.time / NANOSECONDS, self._states, accelerations)
         self.tick += 1
+        return [name for name, missed in zip(self._names, self._missed, strict=True) if missed]

@@ -1,0 +1,28 @@
+"""The controller node: estimates and targets in, thrust out."""
+
+from formation_gnc.control.autopilot import Autopilot, ControllerParameters
+from formation_gnc.interface import Estimate, Status, Target, Thrust
+from formation_gnc.nodes import topics
+from formation_gnc.nodes.shell import PartNode, run
+
+
+class ControllerNode(PartNode[Autopilot]):
+    """Answers each pair of estimate and target with a thrust command and a status."""
+
+    def __init__(self) -> None:
+        """Listen and speak in the deputy's namespace."""
+        super().__init__("controller", ControllerParameters, Autopilot)
+        self.publish_thrust = self.speak(Thrust, topics.THRUST)
+        self.publish_status = self.speak(Status, topics.STATUS)
+        self.answer(self.on_tick, {topics.ESTIMATE: Estimate, topics.TARGET: Target})
+
+    def on_tick(self, estimate: Estimate, target: Target) -> None:
+        """One tick; the plant waits for the thrust, so that goes first."""
+        thrust, status = self.part.on_tick(estimate, target)
+        self.publish_thrust(thrust)
+        self.publish_status(status)
+
+
+def main() -> int:
+    """Run the node."""
+    return run(ControllerNode)

@@ -1,0 +1,27 @@
+"""The navigation node: measurements in, estimates out."""
+
+from formation_gnc.interface import Estimate, Measurement
+from formation_gnc.navigation.navigator import NavigationParameters, Navigator
+from formation_gnc.nodes import topics
+from formation_gnc.nodes.shell import PartNode, run
+
+
+class NavigationNode(PartNode[Navigator]):
+    """Answers each measurement with an estimate."""
+
+    def __init__(self) -> None:
+        """Listen and speak in the deputy's namespace."""
+        super().__init__("navigation", NavigationParameters, Navigator)
+        self.publish = self.speak(Estimate, topics.ESTIMATE)
+        self.answer(self.on_tick, {topics.MEASUREMENT: Measurement})
+
+    def on_tick(self, measurement: Measurement) -> None:
+        """One tick; silent while there is no state to start from."""
+        estimate = self.part.on_tick(measurement)
+        if estimate is not None:
+            self.publish(estimate)
+
+
+def main() -> int:
+    """Run the node."""
+    return run(NavigationNode)

@@ -1,0 +1,234 @@
+"""The plant node: owns time, and lets a tick pass when every deputy has answered."""
+
+from collections.abc import Iterator
+from time import monotonic
+from typing import Any
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from formation_gnc_msgs.msg import Thrust as ThrustMessage
+from rclpy._rclpy_pybind11 import NodeNameNonExistentError
+from rclpy.task import Future
+from rosgraph_msgs.msg import Clock
+
+from formation_gnc.interface import NANOSECONDS, Event, Measurement, Thrust, Truth, Vector
+from formation_gnc.nodes import topics
+from formation_gnc.nodes.conversion import from_message, message_type, to_message
+from formation_gnc.nodes.shell import ConfiguredNode, run, spin
+from formation_gnc.plant.plant import Plant, PlantParameters
+
+PARTS = ("navigation", "guidance", "controller")
+"""Nodes that every deputy must have before the run starts."""
+
+RECORDER_LAG = topics.DEPTH // 4
+"""Ticks that the plant may be ahead of the recorder: well inside what the queues hold."""
+
+CHECK_PERIOD = 0.05
+"""Wall time (s) between looks at deadlines, at the recorder and at who is there."""
+
+REPORT_PERIOD = 0.5
+"""Wall time (s) between reports on `/diagnostics`."""
+
+
+class PlantNode(ConfiguredNode):
+    """Publishes a tick, gathers the thrust of its stamp, steps, and so on to the end of the run.
+
+    The run starts when every deputy's nodes are there, and then a deputy has `deadline` seconds of wall time for each answer, from its
+    first one on: after that it gets no thrust for the tick. The plant never runs further ahead of a recorder than queues hold.
+    """
+
+    def __init__(self) -> None:
+        """Build the plant from the node's parameters."""
+        super().__init__("plant", PlantParameters)
+        self.plant = Plant(self.values)
+        self.done = Future()
+        self._measurement = {
+            name: self._publisher(Measurement, f"/{name}/{topics.MEASUREMENT}") for name in self.values.deputies
+        }
+        self._truth = self._publisher(Truth, topics.TRUTH)
+        self._events = self._publisher(Event, topics.EVENTS)
+        self._clock = self.create_publisher(Clock, topics.CLOCK, topics.quality())
+        self._diagnostics = self.create_publisher(DiagnosticArray, topics.DIAGNOSTICS, topics.quality())
+        for name in self.values.deputies:
+            self.create_subscription(
+                ThrustMessage,
+                f"/{name}/{topics.THRUST}",
+                lambda message, name=name: self._on_thrust(name, message),
+                topics.quality(topics.LATEST),
+            )
+        self.create_subscription(Clock, topics.RECORDED, self._on_recorded, topics.quality(topics.LATEST))
+        self._forces: dict[str, Vector] = {}
+        self._awaited: set[str] = set()
+        self._answered_before: set[str] = set()
+        self._flying = False
+        self._recorded: int | None = None
+        self._held = False
+        self._misses = 0
+        self._started = self._tick_started = self._reported = monotonic()
+        self._said = ""
+
+    def _publisher(self, record: type, topic: str) -> Any:
+        return self.create_publisher(message_type(record), topic, topics.quality())
+
+    def check(self) -> None:
+        """Do what no message triggers: start, deadlines, pace, a recorder that lags, reports."""
+        if not self._flying:
+            missing = ", ".join(self._missing())
+            self._say(f"waiting for {missing}" if missing else "flying")
+            if missing:
+                return self._report(self._said)
+            self._flying = True
+            self._started = monotonic()
+            return self._publish_tick()
+        now = monotonic()
+        late = sorted(self._awaited & self._answered_before)
+        if late and now - self._tick_started > self.values.deadline:
+            self._awaited -= set(late)
+        elif self._awaited and now - self._tick_started > self.values.deadline:
+            self._say(f"waiting for the first answer of {', '.join(sorted(self._awaited))}")
+        self._advance_if_ready()
+        if now - self._reported > REPORT_PERIOD:
+            self._report("flying")
+
+    def _advance_if_ready(self) -> None:
+        if not self._awaited and not self.done.done() and self._recorder_keeps_up() and self._wait_for_pace() <= 0.0:
+            self._advance()
+
+    def _on_thrust(self, name: str, message: Any) -> None:
+        thrust = from_message(Thrust, message)
+        if name not in self._awaited or thrust.time != self.plant.time:
+            return
+        self._awaited.discard(name)
+        self._answered_before.add(name)
+        self._forces[name] = thrust.force
+        self._advance_if_ready()
+
+    def _advance(self) -> None:
+        tick, time = self.plant.tick, self.plant.time
+        for name in self.plant.step(self._forces):
+            detail = f"{name} {self._reason_of_miss(name)}: no thrust"
+            self.get_logger().warning(f"tick {tick}: miss: {detail}")
+            self._tell_event(time, tick, "miss", detail)
+            self._misses += 1
+        if self.plant.finished:
+            detail = f"{self.plant.tick} ticks flown, {self._misses} missed"
+            self._tell_event(self.plant.time, self.plant.tick, "end", detail)
+            self._report("finished")
+            self.done.set_result(None)
+        else:
+            self._publish_tick()
+
+    def _reason_of_miss(self, name: str) -> str:
+        if name in self._forces:
+            return f"commanded {self._forces[name].tolist()} N"
+        absent = [node for node in self._missing() if node.startswith(f"/{name}/")]
+        where = f"{', '.join(absent)} not there" if absent else "all its nodes are there"
+        return f"did not answer within {self.values.deadline:g} s ({where})"
+
+    def _publish_tick(self) -> None:
+        self._forces = {}
+        self._awaited = set(self.values.deputies)
+        self._tick_started = monotonic()
+        truth, measurements = self.plant.observe()
+        for name, measurement in measurements.items():  # first, since everybody waits for them
+            self._measurement[name].publish(to_message(measurement))
+        self._truth.publish(to_message(truth))
+        clock = Clock()
+        clock.clock.sec, clock.clock.nanosec = divmod(truth.time, NANOSECONDS)
+        self._clock.publish(clock)
+
+    def _tell_event(self, time: int, tick: int, kind: str, detail: str) -> None:
+        self._events.publish(to_message(Event(time, tick, self.get_fully_qualified_name(), kind, detail)))
+
+    def _on_recorded(self, message: Clock) -> None:
+        self._recorded = message.clock.sec * NANOSECONDS + message.clock.nanosec
+        if self._held:
+            self._advance_if_ready()
+
+    def _recorder_keeps_up(self) -> bool:
+        lag = self.plant.time - (self._recorded or 0)
+        self._held = lag > RECORDER_LAG * self.values.tick_ns and self.count_publishers(topics.RECORDED) > 0
+        return not self._held
+
+    def wait_for_recorder(self) -> bool:
+        """Whether a recorder is there that has not got the last tick yet."""
+        last = (self.plant.tick - 1) * self.values.tick_ns
+        return self.count_publishers(topics.RECORDED) > 0 and (self._recorded is None or self._recorded < last)
+
+    def _wait_for_pace(self) -> float:
+        """Wall time (s) until the tick may end at the real-time factor."""
+        if self.values.real_time_factor == 0.0:
+            return 0.0
+        due = self._started + (self.plant.tick + 1) * self.values.tick / self.values.real_time_factor
+        return due - monotonic()
+
+    @property
+    def period(self) -> float:
+        """Wall time (s) until the next check."""
+        pace = self._wait_for_pace() if self._flying and not self._awaited else 0.0
+        return min(CHECK_PERIOD, pace) if pace > 0.0 else CHECK_PERIOD
+
+    def _missing(self) -> Iterator[str]:
+        """Full names of the nodes the run still waits for."""
+        there = {
+            f"{namespace.rstrip('/')}/{name}" for name, namespace in self.get_node_names_and_namespaces()
+        }
+        for deputy in self.values.deputies:
+            for part in PARTS:
+                if f"/{deputy}/{part}" not in there:
+                    yield f"/{deputy}/{part}"
+        if self.values.wait_for_recorder and not self._recorder_listens():
+            yield "/recorder"
+
+    def _recorder_listens(self) -> bool:
+        """Whether a recorder has subscribed to every topic of the run."""
+        try:
+            heard = dict(self.get_subscriber_names_and_types_by_node("recorder", "/"))
+        except NodeNameNonExistentError:
+            return False
+        names = [f"/{deputy}/{topic}" for deputy in self.values.deputies for topic in topics.DEPUTY_TOPICS]
+        return all(name in heard for name in (topics.CLOCK, topics.TRUTH, topics.EVENTS, *names))
+
+    def _say(self, text: str) -> None:
+        if text != self._said:
+            self.get_logger().info(text)
+            self._said = text
+
+    def _report(self, message: str) -> None:
+        now = self._reported = monotonic()
+        elapsed = now - self._started if self._flying else 0.0
+        flown = self.plant.tick * self.values.tick
+        figures = {
+            "tick": self.plant.tick,
+            "ticks": self.values.ticks,
+            "misses": self._misses,
+            "wall_time": round(elapsed, 6),
+            "speedup": round(flown / elapsed, 3) if elapsed > 0.0 else 0.0,
+        }
+        status = DiagnosticStatus(
+            level=DiagnosticStatus.WARN if self._misses else DiagnosticStatus.OK,
+            name="formation_gnc: run",
+            message=message,
+            values=[KeyValue(key=key, value=str(value)) for key, value in figures.items()],
+        )
+        report = DiagnosticArray(status=[status])
+        report.header.stamp.sec, report.header.stamp.nanosec = divmod(self.plant.time, NANOSECONDS)
+        self._diagnostics.publish(report)
+
+
+def fly(node: PlantNode) -> None:
+    """Fly the run to its end, and see the recorder through."""
+    spin(node, node.done, node.check, lambda: node.period)
+    recorded = Future()
+
+    def check() -> None:
+        if not node.wait_for_recorder():
+            recorded.set_result(None)
+
+    if rclpy.ok():
+        spin(node, recorded, check, lambda: CHECK_PERIOD)
+
+
+def main() -> int:
+    """Run the node."""
+    return run(PlantNode, fly)

@@ -1,0 +1,173 @@
+"""The recorder node: every topic, byte for byte, into an MCAP bag."""
+
+import signal
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib import import_module
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+import yaml
+from rcl_interfaces.msg import ParameterType
+from rclpy.parameter import parameter_value_to_python
+from rclpy.parameter_client import AsyncParameterClient
+from rclpy.qos import QoSDurabilityPolicy
+from rclpy.task import Future
+from rosgraph_msgs.msg import Clock
+
+from formation_gnc.interface import NANOSECONDS
+from formation_gnc.mission import Mission
+from formation_gnc.nodes import topics
+from formation_gnc.nodes.shell import ConfiguredNode, run, spin
+from formation_gnc.parameters import parameter
+from formation_gnc.recording.provenance import provenance
+from formation_gnc.recording.writer import BagWriter
+
+LOOK_PERIOD = 0.1
+"""Wall time (s) between looks for new topics and nodes, and between reports of progress."""
+
+FLUSH_PERIOD = 0.25
+"""Wall time (s) after which what was recorded is on disk: what a power cut can take."""
+
+REPORT_TICKS = 64
+"""Ticks after which progress is reported at the latest."""
+
+QUIET = 0.2
+"""Wall time (s) without a message after which a recorder that is told to stop believes that all has come."""
+
+
+@dataclass(frozen=True)
+class RecorderParameters(Mission):
+    """Where to record to."""
+
+    bag: str = parameter("", doc="directory to make for the bag; empty for bags/ and the date and time")
+
+
+class RecorderNode(ConfiguredNode):
+    """Subscribes to every topic there is and writes what comes, as it came.
+
+    Messages are stamped with simulated time: their own header's for the project's messages, the latest tick's for others.
+    """
+
+    def __init__(self) -> None:
+        """Make the bag; raises ConfigurationError if its directory exists."""
+        super().__init__("recorder", RecorderParameters)
+        directory = self.values.bag or f"bags/{datetime.now(UTC):%Y-%m-%d_%H-%M-%S}"
+        self.bag = BagWriter(Path(directory), provenance())
+        self.get_logger().info(f"recording to {directory}")
+        self._progress = self.create_publisher(Clock, topics.RECORDED, topics.quality(topics.LATEST))
+        self._topics: set[str] = set()
+        self._counts: dict[str, int] = {}
+        self._asked: set[str] = set()
+        self._parameters: dict[str, dict[str, Any]] = {}
+        self._time = self._reported = -1
+        self._last_message = monotonic()
+        self._since_report = 0
+        self.create_timer(LOOK_PERIOD, self._look)
+        self.create_timer(FLUSH_PERIOD, self.bag.flush)
+
+    def is_quiet(self) -> bool:
+        """Whether nothing has come for a while."""
+        return monotonic() - self._last_message > QUIET
+
+    def close(self) -> None:
+        """Write what is known only at the end, and finish the bag."""
+        for node, values in sorted(self._parameters.items()):
+            self.bag.add_metadata(f"parameters {node}", {name: yaml.safe_dump(value).strip() for name, value in values.items()})
+        self.bag.close()
+
+    def _look(self) -> None:
+        for topic, (type_name, *_) in self.get_topic_names_and_types():
+            if topic not in self._topics:
+                self._topics.add(topic)
+                self._record(topic, type_name)
+        for name, namespace in self.get_node_names_and_namespaces():
+            self._ask_parameters(f"{namespace.rstrip('/')}/{name}")
+        if self._time != self._reported:
+            self._report()
+
+    def _record(self, topic: str, type_name: str) -> None:
+        try:
+            package, kind, name = type_name.split("/")
+            message_type = getattr(import_module(f"{package}.{kind}"), name)
+            self.bag.add_topic(topic, type_name, topics.DEPTH)
+        except (ImportError, AttributeError, ValueError) as error:
+            self.get_logger().warning(f"{topic} is not recorded: {type_name} is not installed ({error})")
+            return
+        self._counts[topic] = 0
+        offers = self.get_publishers_info_by_topic(topic)
+        quality = topics.quality()
+        if any(offer.qos_profile.durability == QoSDurabilityPolicy.VOLATILE for offer in offers):
+            quality.durability = QoSDurabilityPolicy.VOLATILE
+        self.create_subscription(message_type, topic, self._receiver(topic, message_type), quality, raw=True)
+
+    def _receiver(self, topic: str, message_type: Any) -> Callable[[bytes], None]:
+        stamped = "std_msgs/Header" in list(message_type.get_fields_and_field_types().values())[:1]
+        is_clock = topic == topics.CLOCK
+
+        def receive(data: bytes) -> None:
+            self._last_message = monotonic()
+            if is_clock:
+                self._time = _first_stamp(data)
+            self._counts[topic] += 1
+            self.bag.write(topic, data, _first_stamp(data) if stamped else max(self._time, 0), self._counts[topic])
+            if is_clock:
+                self._since_report += 1
+                if self._since_report >= REPORT_TICKS:
+                    self._report()
+
+        return receive
+
+    def _report(self) -> None:
+        self._reported, self._since_report = self._time, 0
+        progress = Clock()
+        progress.clock.sec, progress.clock.nanosec = divmod(self._time, NANOSECONDS)
+        self._progress.publish(progress)
+
+    def _ask_parameters(self, node: str) -> None:
+        """Ask a node once for all its parameters, for the record."""
+        if node in self._asked or node == self.get_fully_qualified_name():
+            return
+        client = AsyncParameterClient(self, node)
+        if not client.services_are_ready():
+            return
+        self._asked.add(node)
+
+        def on_list(answer: Future) -> None:
+            names = list(answer.result().result.names)
+            client.get_parameters(names, callback=lambda values: on_values(names, values))
+
+        def on_values(names: list[str], answer: Future) -> None:
+            self._parameters[node] = {
+                name: parameter_value_to_python(value)
+                for name, value in zip(names, answer.result().values, strict=True)
+                if value.type != ParameterType.PARAMETER_NOT_SET
+            }
+
+        client.list_parameters(callback=on_list)
+
+
+def _first_stamp(data: bytes) -> int:
+    """The stamp that a message begins with, in ns: after four bytes that tell the encoding, seconds and nanoseconds."""
+    seconds, nanoseconds = struct.unpack_from("<iI", data, 4)
+    return int(seconds * NANOSECONDS + nanoseconds)
+
+
+def record(node: RecorderNode) -> None:
+    """Record until told to stop, and then until nothing more comes."""
+    stopped, quiet = Future(), Future()
+    for name in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(name, lambda *_: stopped.done() or stopped.set_result(None))
+    try:
+        spin(node, stopped, period=lambda: LOOK_PERIOD)
+        spin(node, quiet, lambda: node.is_quiet() and quiet.set_result(None), lambda: LOOK_PERIOD)
+    finally:
+        node.close()
+
+
+def main() -> int:
+    """Run the node; it handles its own signals, since a bag is closed only when all has come."""
+    return run(RecorderNode, record, handle_signals=False)

@@ -1,0 +1,192 @@
+"""What all nodes share: parameters from a schema, the main loop, and the shell of a part."""
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import rclpy
+from formation_gnc_msgs.msg import Timing
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, RMWError, UnknownROSArgsError
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.service import Service
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+from std_msgs.msg import Header
+
+try:
+    from rclpy.experimental import EventsExecutor as Executor
+except ImportError:  # other builds of Jazzy do not have it; theirs is slower and does the same
+    Executor = SingleThreadedExecutor
+
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.interface import Event
+from formation_gnc.nodes import topics
+from formation_gnc.nodes.conversion import from_message, message_type, to_message
+from formation_gnc.parameters import Leaf, dump, leaves, load
+from formation_gnc.part import Part
+
+REFUSED_BY_ROS = (RCLInvalidROSArgsError, UnknownROSArgsError, RCLError, RMWError)
+"""What rclpy raises for arguments, parameter files and middleware it cannot use."""
+
+OWN_OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides")
+"""Parameters that every ROS node has, or may be given, besides its schema."""
+
+
+class ConfiguredNode(Node):  # type: ignore[misc]
+    """A node whose parameters come from a schema.
+
+    `values` is the schema's instance. An override that the schema does not know or allow raises ConfigurationError, as does a
+    later change of it, with the same words, through the parameter service.
+    """
+
+    def __init__(self, name: str, schema: type, namespace: str = "") -> None:
+        """Declare the schema's parameters with the values given on the command line and in parameter files."""
+        super().__init__(name, namespace=namespace, automatically_declare_parameters_from_overrides=True)
+        given = {
+            parameter.name: parameter.value
+            for parameter in self.get_parameters_by_prefix("").values()
+            if not parameter.name.startswith(OWN_OF_ROS)
+        }
+        self.values: Any = load(schema, given)
+        settled = dump(self.values)
+        for leaf in leaves(schema, settled):
+            value = settled[leaf.name]
+            plain = list(value) if isinstance(value, tuple) else value
+            if leaf.name in given:
+                self.undeclare_parameter(leaf.name)
+            self.declare_parameter(leaf.name, plain, _descriptor(leaf), ignore_override=True)
+
+
+def _descriptor(leaf: Leaf) -> ParameterDescriptor:
+    limits = leaf.limits
+    unit = f" [{limits.unit}]" if limits.unit else ""
+    return ParameterDescriptor(
+        name=leaf.name,
+        description=f"{limits.doc}{unit}",
+        additional_constraints=limits.allowed(),
+        read_only=not limits.in_flight,
+        dynamic_typing=True,  # so that 5 is as good as 5.0; the schema checks the type
+    )
+
+
+class PartNode[P: Part[Any, Any]](ConfiguredNode):
+    """Shell of a part of one deputy: messages to records, one call, records to messages.
+
+    A change of parameters through the standard services is checked and designed in a thread of its own, so that no answer waits
+    for it, and takes over at the next tick; it is answered when that is settled, with the reason if it is refused.
+    """
+
+    def __init__(self, name: str, schema: type, part: Callable[[str, Any], P]) -> None:
+        """Build the part from the node's parameters; the namespace is deputy1 unless it is remapped."""
+        super().__init__(name, schema, namespace="deputy1")
+        self.part = part(self.get_fully_qualified_name(), self.values)
+        self._answered: set[int] = set()
+        self._tell_event = self.speak(Event, topics.EVENTS)
+        self._timing = self.create_publisher(Timing, topics.TIMING, topics.quality())
+        self._designer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="design")
+        self.add_on_set_parameters_callback(self._on_set_parameters)
+        for service in self.services:
+            if service.srv_name.endswith(("/set_parameters", "/set_parameters_atomically")):
+                _answer_from(self._designer, service)
+
+    def answer(self, respond: Callable[..., None], inputs: Mapping[str, type]) -> None:
+        """Call `respond` with one record of every input topic as soon as all of one stamp are there, once per stamp."""
+        latest: dict[str, Any] = {}
+        for topic, record in inputs.items():
+
+            def receive(message: Any, topic: str = topic, record: type = record) -> None:
+                started = perf_counter()
+                latest[topic] = from_message(record, message)
+                times = {each.time for each in latest.values()}
+                if len(latest) < len(inputs) or len(times) > 1 or times == self._answered:
+                    return
+                self._answered = times
+                respond(*(latest[topic] for topic in inputs))
+                self._finish_tick(message.header, started)
+
+            self.create_subscription(message_type(record), topic, receive, topics.quality(topics.LATEST))
+
+    def speak(self, record: type, topic: str) -> Callable[[Any], None]:
+        """A function that publishes a record on a topic."""
+        publisher = self.create_publisher(message_type(record), topic, topics.quality())
+        return lambda each: publisher.publish(to_message(each))
+
+    def _finish_tick(self, header: Any, started: float) -> None:
+        """Publish what nobody waits for: the events, and the wall time that the answer took."""
+        self._timing.publish(
+            Timing(header=Header(stamp=header.stamp), node=self.get_name(), compute_time=perf_counter() - started)
+        )
+        for event in self.part.take_events():
+            self.get_logger().info(f"tick {event.tick}: {event.kind}: {event.detail}")
+            self._tell_event(event)
+
+    def _on_set_parameters(self, parameters: Sequence[Parameter]) -> SetParametersResult:
+        changes = {each.name: each.value for each in parameters if not each.name.startswith(OWN_OF_ROS)}
+        if changes:
+            try:
+                self.part.adopt(self.part.prepare(changes))
+            except ConfigurationError as refusal:
+                return SetParametersResult(successful=False, reason=str(refusal))
+        return SetParametersResult(successful=True)
+
+    def destroy_node(self) -> None:
+        """Let no design outlive the node."""
+        self._designer.shutdown(wait=False, cancel_futures=True)
+        super().destroy_node()
+
+
+def _answer_from(pool: ThreadPoolExecutor, service: Service) -> None:
+    """Let a thread of `pool` work out a service's answers and send each when it is there."""
+    handle, send = service.callback, service.send_response
+    service.callback = lambda request, response: pool.submit(handle, request, response)
+    service.send_response = lambda answer, header: answer.add_done_callback(
+        lambda done: send(done.result(), header)
+    )
+
+
+def spin(
+    node: Node,
+    until: Future | None = None,
+    check: Callable[[], None] = lambda: None,
+    period: Callable[[], float] = lambda: 0.5,
+) -> None:
+    """Let a node work until it is interrupted or `until` is done; `check` is called every `period` (s) or sooner."""
+    executor = Executor()
+    executor.add_node(node)
+    until = until or Future()
+    try:
+        while rclpy.ok() and not until.done():
+            executor.spin_until_future_complete(until, timeout_sec=period())
+            check()
+    finally:
+        executor.remove_node(node)
+
+
+def run(make_node: Callable[[], Any], fly: Callable[[Any], None] = spin, handle_signals: bool = True) -> int:
+    """Body of every executable: make the node, let it fly, and end with the exit status.
+
+    Returns:
+        0 after an ordinary end or an interruption, 2 when something given to the node is not allowed.
+    """
+    node = None
+    try:
+        handlers = SignalHandlerOptions.ALL if handle_signals else SignalHandlerOptions.NO
+        rclpy.init(args=sys.argv, signal_handler_options=handlers)
+        node = make_node()
+        fly(node)
+    except (ConfigurationError, *REFUSED_BY_ROS) as refusal:
+        print(f"{Path(sys.argv[0]).name}: {' '.join(str(refusal).split())}", file=sys.stderr)
+        return 2
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return 0

@@ -1,0 +1,36 @@
+"""Names of topics and the one quality of service they all have."""
+
+from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSProfile, QoSReliabilityPolicy
+
+DEPTH = 2000
+"""Messages that a writer keeps for who is late or slow, and that the recorder may lag behind."""
+
+CLOCK = "/clock"
+TRUTH = "/truth"
+EVENTS = "/events"
+DIAGNOSTICS = "/diagnostics"
+RECORDED = "/recorder/progress"
+"""Stamp up to which the recorder has everything."""
+
+MEASUREMENT = "measurement"
+ESTIMATE = "estimate"
+TARGET = "target"
+THRUST = "thrust"
+STATUS = "status"
+TIMING = "timing"
+DEPUTY_TOPICS = (MEASUREMENT, ESTIMATE, TARGET, THRUST, STATUS, TIMING)
+"""Relative to the deputy's namespace."""
+
+
+def quality(depth: int = DEPTH) -> QoSProfile:
+    """Reliable, and kept for late joiners: a node started again finds the message it has to answer."""
+    return QoSProfile(
+        reliability=QoSReliabilityPolicy.RELIABLE,
+        durability=QoSDurabilityPolicy.TRANSIENT_LOCAL,
+        history=QoSHistoryPolicy.KEEP_LAST,
+        depth=depth,
+    )
+
+
+LATEST = 1
+"""Depth of a reader that answers tick by tick: what it did not answer in time has no use any more."""

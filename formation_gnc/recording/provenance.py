@@ -1,0 +1,32 @@
+"""Where a log comes from: versions and commit, for its metadata."""
+
+import platform
+import subprocess
+from importlib.metadata import version
+from pathlib import Path
+
+import formation_gnc
+
+PACKAGES = ("numpy", "scipy", "numba", "filterpy", "osqp", "mcap")
+
+
+def provenance() -> dict[str, dict[str, str]]:
+    """Metadata records of a bag by name: what software flew, nothing of the machine it flew on."""
+    return {
+        "versions": {
+            "formation_gnc": formation_gnc.__version__,
+            "commit": commit(),
+            "python": platform.python_version(),
+            **{package: version(package) for package in PACKAGES},
+        }
+    }
+
+
+def commit() -> str:
+    """The git commit of the source tree, with `-dirty` when it has changes; `unknown` outside a checkout."""
+    source = Path(formation_gnc.__file__).resolve().parent
+    command = ["git", "-C", str(source), "describe", "--always", "--abbrev=40", "--dirty"]
+    try:
+        return subprocess.run(command, check=True, capture_output=True, text=True, timeout=5.0).stdout.strip()
+    except (OSError, subprocess.SubprocessError):
+        return "unknown"
