@@ -39,9 +39,9 @@ RELATIVE = st.tuples(*[st.floats(-1e5, 1e5)] * 3, *[st.floats(-100, 100)] * 3).m
 @given(chiefs(), RELATIVE)
 def test_relative_state_survives_the_round_trip(chief, relative):
     again = relative_from_inertial(chief, inertial_from_relative(chief, relative))
-    # One part in 1e16 of the orbit's radius and speed.
-    assert np.abs(again - relative)[:3].max() < 1e-8
-    assert np.abs(again - relative)[3:].max() < 1e-11
+    # A few parts in 1e16 of the orbit's radius, up to 4e7 m, and speed.
+    assert np.abs(again - relative)[:3].max() < 5e-8
+    assert np.abs(again - relative)[3:].max() < 5e-11
 
 
 @given(chiefs(), RELATIVE)
@@ -50,19 +50,19 @@ def test_transform_is_the_linear_form_of_the_exact_map(chief, relative):
     assert hill_transform(chief) @ (deputy - chief) == pytest.approx(
         relative_from_inertial(chief, deputy), abs=1e-7
     )
-    assert hill_transform(chief) @ hill_transform_inverse(chief) == pytest.approx(np.eye(6), abs=1e-15)
+    assert hill_transform(chief) @ hill_transform_inverse(chief) == pytest.approx(np.eye(6), abs=1e-14)
 
 
 @given(chiefs())
 def test_hill_axes_are_radial_along_track_and_normal(chief):
     rotation = hill_rotation(chief)
-    assert rotation @ rotation.T == pytest.approx(np.eye(3), abs=1e-15)
+    assert rotation @ rotation.T == pytest.approx(np.eye(3), abs=1e-14)
     assert np.linalg.det(rotation) == pytest.approx(1.0)
     radius, speed = np.linalg.norm(chief[:3]), np.linalg.norm(chief[3:])
-    assert rotation @ chief[:3] == pytest.approx([radius, 0, 0], abs=1e-8)
+    assert rotation @ chief[:3] == pytest.approx([radius, 0, 0], abs=1e-14 * radius)
     velocity = rotation @ chief[3:]
     assert velocity[1] > 0.0
-    assert abs(velocity[2]) < 1e-15 * speed * 10
+    assert abs(velocity[2]) < 1e-14 * speed
     assert hill_rate(chief) == pytest.approx(velocity[1] / radius)
 
 
