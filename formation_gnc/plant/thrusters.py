@@ -1,0 +1,242 @@
+"""What a deputy's thrusters make of a command."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from math import copysign, exp, hypot, isfinite
+
+import numpy as np
+
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.interface import Vector
+from formation_gnc.parameters import parameter
+
+STANDARD_GRAVITY = 9.80665
+"""By which specific impulse is counted, m/s^2."""
+
+
+@dataclass(frozen=True)
+class ThrusterParameters:
+    """Limits and imperfections of the thrusters along the three Hill axes; zeros mean an ideal actuator."""
+
+    limit: tuple[float, ...] = parameter(
+        (0.01, 0.01, 0.01), unit="N", length=3, minimum=0.0, doc="largest force per Hill axis"
+    )
+    total_limit: float = parameter(
+        0.0,
+        unit="N",
+        minimum=0.0,
+        doc="largest magnitude of one gimballed thruster; 0 for one thruster per axis",
+    )
+    dead_band: float = parameter(0.0, unit="N", minimum=0.0, doc="command per axis below which nothing fires")
+    minimum_impulse: float = parameter(
+        0.0, unit="N s", minimum=0.0, doc="smallest impulse per axis and tick; a smaller one does not fire"
+    )
+    quantum: float = parameter(
+        0.0, unit="N", minimum=0.0, doc="step between forces per axis; 0 for continuous"
+    )
+    lag: float = parameter(0.0, unit="s", minimum=0.0, doc="time constant of the force's rise and fall")
+    misalignment: float = parameter(
+        0.0,
+        unit="rad",
+        minimum=0.0,
+        maximum=0.5,
+        doc="standard deviation of the mounting error about each axis",
+    )
+    magnitude_noise: float = parameter(
+        0.0,
+        minimum=0.0,
+        maximum=1.0,
+        doc="standard deviation of the force per axis and tick, as a fraction of it",
+    )
+    specific_impulse: float = parameter(
+        0.0,
+        unit="s",
+        minimum=0.0,
+        doc="exhaust velocity over standard gravity; 0 for thrust that costs no mass",
+    )
+    dry_mass: float = parameter(0.0, unit="kg", minimum=0.0, doc="mass at which the tank is empty")
+    off_in_eclipse: bool = parameter(False, doc="no thrust while any of the Sun is hidden")
+    failed: tuple[bool, ...] = parameter(
+        (False, False, False), length=3, in_flight=True, doc="axes whose thruster does not fire"
+    )
+
+
+class Denial(StrEnum):
+    """Why a thruster did not give what was asked."""
+
+    NOT_FINITE = "command not finite"
+    ECLIPSE = "eclipse"
+    EMPTY = "empty tank"
+    FAILED = "failed axis"
+    LIMIT = "limit"
+    TOO_SMALL = "below dead band or minimum impulse"
+
+
+@dataclass(frozen=True, slots=True)
+class ThrusterState:
+    """What a thruster remembers from tick to tick."""
+
+    mass: float
+    """Of the whole satellite, kg."""
+    output: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Force at the end of the tick, before noise and misalignment, N: the memory of the lag."""
+
+
+class Thruster:
+    """Force of a deputy's thrusters over a tick.
+
+    In this order: a command that is not finite, in eclipse (if so configured) or with an empty tank gives no
+    force at once; a failed axis none on that axis. The rest is limited, rounded to the quantum, dropped where
+    it is too small, delayed by the lag, disturbed by noise and turned by the misalignment. The force is the
+    mean over the tick, so that the impulse is exact with a lag too. When the tank runs dry within a tick, the
+    force is what the rest can give.
+
+    Assumes: thrusters fixed to the Hill axes, an exhaust of one velocity.
+    """
+
+    def __init__(self, parameters: ThrusterParameters, tick: float, generator: np.random.Generator) -> None:
+        """Mount the thrusters.
+
+        Args:
+            parameters: may be replaced in flight; the misalignment is drawn here, once.
+            tick: s.
+            generator: of this deputy's thrusters alone; drawn from here, and at every tick if there is noise.
+
+        Raises:
+            ConfigurationError: a quantum that leaves nothing to fire, or is too fine to count.
+        """
+        largest = max(*parameters.limit, parameters.total_limit)
+        if parameters.quantum and not 1e-9 * largest <= parameters.quantum <= largest:
+            raise ConfigurationError(
+                f"parameter quantum: {parameters.quantum!r} N is not allowed; "
+                f"it must be 0 or from {1e-9 * largest:g} to the largest force, {largest:g}"
+            )
+        self.parameters = parameters
+        self._tick, self._generator = tick, generator
+        self._mounting = _rotation(parameters.misalignment * generator.standard_normal(3))
+
+    def start(self, mass: float) -> ThrusterState:
+        """State of a satellite that has not fired yet.
+
+        Args:
+            mass: with propellant, kg.
+
+        Raises:
+            ConfigurationError: a mass that is not above zero, or below the dry mass.
+        """
+        if not (isfinite(mass) and mass > 0.0):
+            raise ConfigurationError(f"parameter mass: {mass!r} kg is not allowed; it must be above 0")
+        if mass < self.parameters.dry_mass:
+            raise ConfigurationError(
+                f"parameter mass: {mass!r} kg is not allowed; it must be at least the dry mass, "
+                f"{self.parameters.dry_mass!r} kg"
+            )
+        return ThrusterState(mass)
+
+    def apply(
+        self, command: Vector, eclipse: bool, state: ThrusterState
+    ) -> tuple[Vector, ThrusterState, tuple[Denial, ...]]:
+        """Fire for one tick.
+
+        Args:
+            command: force asked for, (3,), Hill frame, N.
+            eclipse: whether any of the Sun is hidden.
+            state: at the start of the tick.
+
+        Returns:
+            The force given, (3,), Hill frame, N, to be held over the tick with the mass at its start; the
+            state at its end; and why the force differs from the command beyond lag, rounding, noise and
+            misalignment.
+        """
+        limits = self.parameters
+        noise = self._generator.standard_normal(3) if limits.magnitude_noise > 0.0 else None
+        wanted = [float(value) for value in command]
+        denial = self._denial(wanted, eclipse, state)
+        if denial is not None:
+            return np.zeros(3), ThrusterState(state.mass), (denial,) if any(wanted) else ()
+        output, reasons = self._valves(wanted)
+        given, end = self._rise(state.output, output)
+        if noise is not None:
+            given = [f * (1.0 + limits.magnitude_noise * float(n)) for f, n in zip(given, noise, strict=True)]
+        mass, share = self._burn(given, state.mass)
+        if share < 1.0:
+            reasons += (Denial.EMPTY,)
+            given, end = [f * share for f in given], (0.0, 0.0, 0.0)
+        force = np.array(given)
+        if limits.misalignment > 0.0:
+            force = self._mounting @ force
+        return force, ThrusterState(mass, end), reasons
+
+    def _denial(self, wanted: list[float], eclipse: bool, state: ThrusterState) -> Denial | None:
+        if not all(isfinite(value) for value in wanted):
+            return Denial.NOT_FINITE
+        if eclipse and self.parameters.off_in_eclipse:
+            return Denial.ECLIPSE
+        if self.parameters.specific_impulse > 0.0 and state.mass <= self.parameters.dry_mass:
+            return Denial.EMPTY
+        return None
+
+    def _valves(self, wanted: list[float]) -> tuple[list[float], tuple[Denial, ...]]:
+        """What the valves are set to, and what was denied on the way."""
+        limits = self.parameters
+        reasons = []
+        output = []
+        for value, limit, failed in zip(wanted, limits.limit, limits.failed, strict=True):
+            if failed and value != 0.0:
+                reasons.append(Denial.FAILED)
+                value = 0.0
+            if abs(value) > limit:
+                reasons.append(Denial.LIMIT)
+                value = copysign(limit, value)
+            output.append(value)
+        total = hypot(*output)
+        if 0.0 < limits.total_limit < total:
+            reasons.append(Denial.LIMIT)
+            output = [value * limits.total_limit / total for value in output]
+        for axis, value in enumerate(output):
+            level = abs(value)
+            if limits.quantum > 0.0:
+                # Towards zero where rounding would break the limit.
+                steps = min(round(level / limits.quantum), int(limits.limit[axis] / limits.quantum + 1e-9))
+                level = steps * limits.quantum
+            if abs(value) < limits.dead_band or level * self._tick < limits.minimum_impulse:
+                if value != 0.0:
+                    reasons.append(Denial.TOO_SMALL)
+                level = 0.0
+            output[axis] = copysign(level, value)
+        return output, tuple(dict.fromkeys(reasons))
+
+    def _rise(
+        self, before: tuple[float, float, float], output: list[float]
+    ) -> tuple[list[float], tuple[float, float, float]]:
+        """Mean force over the tick, and the force at its end, of a first-order lag."""
+        lag = self.parameters.lag
+        if lag == 0.0:
+            return output, (output[0], output[1], output[2])
+        left = exp(-self._tick / lag)
+        mean = lag / self._tick * (1.0 - left)
+        given = [to + (now - to) * mean for now, to in zip(before, output, strict=True)]
+        x, y, z = (to + (now - to) * left for now, to in zip(before, output, strict=True))
+        return given, (x, y, z)
+
+    def _burn(self, given: list[float], mass: float) -> tuple[float, float]:
+        """Mass after the tick, and the share of the force that the propellant lasts for."""
+        limits = self.parameters
+        if limits.specific_impulse == 0.0:
+            return mass, 1.0
+        thrust = hypot(*given) if limits.total_limit > 0.0 else sum(abs(force) for force in given)
+        needed = thrust * self._tick / (limits.specific_impulse * STANDARD_GRAVITY)
+        if needed <= mass - limits.dry_mass:
+            return mass - needed, 1.0
+        return limits.dry_mass, (mass - limits.dry_mass) / needed
+
+
+def _rotation(vector: Vector) -> Vector:
+    """Rotation matrix about a vector by its length (Rodrigues)."""
+    x, y, z = vector
+    angle = float(np.linalg.norm(vector))
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    # Limits of sin(a)/a and (1 - cos a)/a^2 at zero are left to NumPy's sinc.
+    first, second = np.sinc(angle / np.pi), 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2
+    rotation: Vector = np.eye(3) + first * cross + second * cross @ cross
+    return rotation
