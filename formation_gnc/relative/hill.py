@@ -10,21 +10,118 @@ from formation_gnc.errors import ConfigurationError
 from formation_gnc.relative.model import NO_THRUST, ON_THE_CHIEF, Array, LinearModel
 
 
+class HarmonicModel(LinearModel):
+    """A time-invariant model of Hill's form, in closed form under constant thrust.
+
+    x'' = 2 w y' + (4 w^2 - q^2) x + ux,  y'' = -2 w x' + uy,  z'' = -p^2 z + uz
+
+    with the frame's rate w, the in-plane frequency q and the cross-track frequency p. `time` has no effect,
+    and `transition`, `discretise` and `propagate` also take an array of durations (...,) and then give
+    (..., 6, 6), (..., 6, 3) and (..., 6): a whole trajectory in one call.
+    """
+
+    is_time_invariant = True
+
+    @property
+    def frequencies(self) -> tuple[float, float, float]:
+        """The rate w and the frequencies q and p, rad/s."""
+        raise NotImplementedError
+
+    @property
+    def period(self) -> float:
+        """Time in which the in-plane motion closes, s."""
+        return math.tau / self.frequencies[1]
+
+    @property
+    def longest_step(self) -> float:
+        """Unlimited: closed forms throughout."""
+        return math.inf
+
+    def dynamics(self, time: float = 0.0, state: Array = ON_THE_CHIEF) -> Array:
+        """(6, 6) continuous matrix A."""
+        w, q, p = self.frequencies
+        matrix = np.zeros((6, 6))
+        matrix[:3, 3:] = np.eye(3)
+        matrix[3, 0] = 4.0 * w**2 - q**2
+        matrix[3, 4] = 2.0 * w
+        matrix[4, 3] = -2.0 * w
+        matrix[5, 2] = -(p**2)
+        return matrix
+
+    def bounded(self, time: float, state: Array) -> Array:
+        """(..., 6) state with the along-track rate -2 w x, for which the closed form has no secular term."""
+        result = np.array(state, dtype=np.float64)
+        result[..., 4] = -2.0 * self.frequencies[0] * result[..., 0]
+        return result
+
+    def transition(self, time: float, duration: ArrayLike, state: Array = ON_THE_CHIEF) -> Array:
+        """(..., 6, 6) state transition matrix over durations (...,)."""
+        w, q, p = self.frequencies
+        t = np.asarray(duration, dtype=np.float64)
+        sine, cosine, versine, lag = _circular_functions(q * t)
+        normal_sine, normal_cosine, _, _ = _circular_functions(p * t)
+        g = 4.0 * w**2 - q**2
+        phi = np.zeros((*t.shape, 6, 6))
+        phi[..., 0, 0] = 1.0 + g * versine / q**2
+        phi[..., 0, 3] = sine / q
+        phi[..., 0, 4] = 2.0 * w * versine / q**2
+        phi[..., 1, 0] = -2.0 * w * g * lag / q**3
+        phi[..., 1, 1] = 1.0
+        phi[..., 1, 3] = -2.0 * w * versine / q**2
+        phi[..., 1, 4] = t - 4.0 * w**2 * lag / q**3
+        phi[..., 2, 2] = normal_cosine
+        phi[..., 2, 5] = normal_sine / p
+        phi[..., 3, 0] = g * sine / q
+        phi[..., 3, 3] = cosine
+        phi[..., 3, 4] = 2.0 * w * sine / q
+        phi[..., 4, 0] = -2.0 * w * g * versine / q**2
+        phi[..., 4, 3] = -2.0 * w * sine / q
+        phi[..., 4, 4] = 1.0 - 4.0 * w**2 * versine / q**2
+        phi[..., 5, 2] = -p * normal_sine
+        phi[..., 5, 5] = normal_cosine
+        return phi
+
+    def discretise(self, time: float, tick: ArrayLike, state: Array = ON_THE_CHIEF) -> tuple[Array, Array]:
+        """Phi (..., 6, 6) and Gamma (..., 6, 3) over durations (...,) of held acceleration."""
+        w, q, p = self.frequencies
+        t = np.asarray(tick, dtype=np.float64)
+        sine, _, versine, lag = _circular_functions(q * t)
+        normal_sine, _, normal_versine, _ = _circular_functions(p * t)
+        gamma = np.zeros((*t.shape, 6, 3))
+        gamma[..., 0, 0] = versine / q**2
+        gamma[..., 0, 1] = 2.0 * w * lag / q**3
+        gamma[..., 1, 0] = -2.0 * w * lag / q**3
+        gamma[..., 1, 1] = t**2 / 2.0 - 4.0 * w**2 * (t**2 / 2.0 - versine / q**2) / q**2
+        gamma[..., 2, 2] = normal_versine / p**2
+        gamma[..., 3, 0] = sine / q
+        gamma[..., 3, 1] = 2.0 * w * versine / q**2
+        gamma[..., 4, 0] = -2.0 * w * versine / q**2
+        gamma[..., 4, 1] = t - 4.0 * w**2 * lag / q**3
+        gamma[..., 5, 2] = normal_sine / p
+        return self.transition(time, tick), gamma
+
+    def propagate(
+        self, time: float, state: Array, duration: ArrayLike, acceleration: Array = NO_THRUST
+    ) -> Array:
+        """(..., 6) states after durations (...,) under a held acceleration, all broadcast together."""
+        phi, gamma = self.discretise(time, duration)
+        free: Array = (phi @ np.asarray(state)[..., None])[..., 0]
+        return free + (gamma @ np.asarray(acceleration)[..., None])[..., 0]
+
+
 @dataclass(frozen=True)
-class HillModel(LinearModel):
+class HillModel(HarmonicModel):
     """Linear relative motion about a chief on a circular orbit of point-mass gravity.
 
     Assumes: circular chief, spherical Earth, separation much smaller than the orbit's radius (the error grows
-    with its square). Source: Roberts (9); Kremmydas section 1.1.3 with thrust, in its own axes; docs/theory.
+    with its square). Source: Roberts (9); Kremmydas section 1.1.3 with thrust, in its own axes.
 
-    Here `time` has no effect, and `transition`, `discretise` and `propagate` also take an array of durations
-    (...,) and then give (..., 6, 6), (..., 6, 3) and (..., 6): a whole trajectory in one call.
+    Raises:
+        ConfigurationError: for a mean motion that is not positive and finite.
     """
 
     mean_motion: float
-    """Angular rate of the chief (rad/s), positive."""
-
-    is_time_invariant = True
+    """Angular rate of the chief, rad/s."""
 
     def __post_init__(self) -> None:
         """Refuse a rate that is not one."""
@@ -34,88 +131,18 @@ class HillModel(LinearModel):
             )
 
     @property
-    def longest_step(self) -> float:
-        """Unlimited: closed forms throughout."""
-        return math.inf
-
-    def dynamics(self, time: float = 0.0, state: Array = ON_THE_CHIEF) -> Array:
-        """(6, 6) continuous matrix A (Roberts (9))."""
-        n = self.mean_motion
-        matrix = np.zeros((6, 6))
-        matrix[:3, 3:] = np.eye(3)
-        matrix[3, 0] = 3.0 * n**2
-        matrix[3, 4] = 2.0 * n
-        matrix[4, 3] = -2.0 * n
-        matrix[5, 2] = -(n**2)
-        return matrix
-
-    def bounded(self, time: float, state: Array) -> Array:
-        """(..., 6) state with the along-track rate -2 n x, for which the closed form has no secular term."""
-        result = np.array(state, dtype=np.float64)
-        result[..., 4] = -2.0 * self.mean_motion * result[..., 0]
-        return result
-
-    def transition(self, time: float, duration: ArrayLike, state: Array = ON_THE_CHIEF) -> Array:
-        """(..., 6, 6) state transition matrix over durations (...,)."""
-        n = self.mean_motion
-        angle = n * np.asarray(duration, dtype=np.float64)
-        sine, cosine = np.sin(angle), np.cos(angle)
-        versine = 2.0 * np.sin(0.5 * angle) ** 2  # 1 - cos, without cancellation over a short tick
-        phi = np.zeros((*angle.shape, 6, 6))
-        phi[..., 0, 0] = 1.0 + 3.0 * versine
-        phi[..., 0, 3] = sine / n
-        phi[..., 0, 4] = 2.0 * versine / n
-        phi[..., 1, 0] = -6.0 * _angle_minus_sine(angle)
-        phi[..., 1, 1] = 1.0
-        phi[..., 1, 3] = -2.0 * versine / n
-        phi[..., 1, 4] = (4.0 * sine - 3.0 * angle) / n
-        phi[..., 2, 2] = cosine
-        phi[..., 2, 5] = sine / n
-        phi[..., 3, 0] = 3.0 * n * sine
-        phi[..., 3, 3] = cosine
-        phi[..., 3, 4] = 2.0 * sine
-        phi[..., 4, 0] = -6.0 * n * versine
-        phi[..., 4, 3] = -2.0 * sine
-        phi[..., 4, 4] = 1.0 - 4.0 * versine
-        phi[..., 5, 2] = -n * sine
-        phi[..., 5, 5] = cosine
-        return phi
-
-    def discretise(self, time: float, tick: ArrayLike, state: Array = ON_THE_CHIEF) -> tuple[Array, Array]:
-        """Phi (..., 6, 6) and Gamma (..., 6, 3) over durations (...,) of held acceleration.
-
-        Gamma is the constant-thrust part of the closed form (Kremmydas section 1.1.3).
-        """
-        n = self.mean_motion
-        angle = n * np.asarray(tick, dtype=np.float64)
-        sine = np.sin(angle)
-        versine = 2.0 * np.sin(0.5 * angle) ** 2
-        lag = 2.0 * _angle_minus_sine(angle) / n**2
-        gamma = np.zeros((*angle.shape, 6, 3))
-        gamma[..., 0, 0] = versine / n**2
-        gamma[..., 0, 1] = lag
-        gamma[..., 1, 0] = -lag
-        gamma[..., 1, 1] = (4.0 * versine - 1.5 * angle**2) / n**2
-        gamma[..., 2, 2] = versine / n**2
-        gamma[..., 3, 0] = sine / n
-        gamma[..., 3, 1] = 2.0 * versine / n
-        gamma[..., 4, 0] = -2.0 * versine / n
-        gamma[..., 4, 1] = (4.0 * sine - 3.0 * angle) / n
-        gamma[..., 5, 2] = sine / n
-        return self.transition(time, tick), gamma
-
-    def propagate(
-        self, time: float, state: Array, duration: ArrayLike, acceleration: Array = NO_THRUST
-    ) -> Array:
-        """(..., 6) states after durations (...,) under a held acceleration, all broadcast together."""
-        free, forced = self.discretise(time, duration)
-        moved: Array = (free @ np.asarray(state)[..., None])[..., 0]
-        return moved + (forced @ np.asarray(acceleration)[..., None])[..., 0]
+    def frequencies(self) -> tuple[float, float, float]:
+        """The mean motion, for all three."""
+        return self.mean_motion, self.mean_motion, self.mean_motion
 
 
-def _angle_minus_sine(angle: Array) -> Array:
-    """Return angle - sin(angle) to full relative precision: over a tick the two agree to ten digits."""
+def _circular_functions(angle: Array) -> tuple[Array, Array, Array, Array]:
+    """Return sin a, cos a, 1 - cos a and a - sin a, the last two to full relative precision.
+
+    Over a tick their terms agree to ten digits, which a plain subtraction would lose.
+    """
+    sine = np.sin(angle)
     square = angle**2
     series = angle * square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0 * (1.0 - square / 72.0)))
-    result: Array = np.where(np.abs(angle) < 0.1, series, angle - np.sin(angle))
-    return result
+    lag = np.where(np.abs(angle) < 0.1, series, angle - sine)
+    return sine, np.cos(angle), 2.0 * np.sin(0.5 * angle) ** 2, lag

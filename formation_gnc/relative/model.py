@@ -1,9 +1,9 @@
 """What every relative-motion model can do.
 
 A model describes how a deputy moves relative to a chief: in the chief's Hill frame (x radial outwards, y
-along-track, z along the orbit normal), with the relative state [x, y, z, vx, vy, vz] in m and m/s, velocities
-as seen in the rotating frame, and accelerations in m/s^2. Times are seconds of the run. A model is a frozen
-dataclass of its parameters, and holds nothing that changes.
+along-track, z along the orbit normal), with the relative state [x, y, z, vx, vy, vz] in m and m/s as
+`formation_gnc.orbit.frames` defines it, and accelerations in m/s^2. Times are seconds of the run. A model
+is a frozen dataclass of its parameters.
 
 Guidance, navigation and control see only this interface, so that any of them flies with any model.
 """
@@ -15,22 +15,26 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import DOP853
+
+from formation_gnc.orbit.runge_kutta import COUPLING, INSTANT_OF_STAGE, INSTANTS, STAGES, WEIGHTS
 
 Array = NDArray[np.float64]
 
-INPUT: Array = np.vstack([np.zeros((3, 3)), np.eye(3)])
-INPUT.setflags(write=False)
-NO_THRUST: Array = np.zeros(3)
-NO_THRUST.setflags(write=False)
-ON_THE_CHIEF: Array = np.zeros(6)
-ON_THE_CHIEF.setflags(write=False)
+
+def _constant(value: Array) -> Array:
+    value.setflags(write=False)
+    return value
+
+
+INPUT = _constant(np.vstack([np.zeros((3, 3)), np.eye(3)]))
+NO_THRUST = _constant(np.zeros(3))
+ON_THE_CHIEF = _constant(np.zeros(6))
 
 
 class RelativeModel(ABC):
     """Motion of a deputy relative to a chief; a subclass's docstring states what it assumes.
 
-    Every model gives `derivative` and `dynamics`; what follows from them is here, by integration to rounding
+    A model gives `derivative` and `dynamics`; what follows from them is here, by integration to rounding
     error, and a model with a closed form overrides it.
     """
 
@@ -41,7 +45,12 @@ class RelativeModel(ABC):
     """Whether the right-hand side is `dynamics(t) x + B u`; then `state` arguments below have no effect."""
 
     is_time_invariant: ClassVar[bool] = False
-    """Whether `dynamics`, `transition` and `discretise` are the same at any time (and state)."""
+    """Whether `dynamics`, `transition` and `discretise` are the same at any time and state."""
+
+    @property
+    @abstractmethod
+    def period(self) -> float:
+        """Time (s) in which the chief comes round to the same argument of latitude."""
 
     @property
     @abstractmethod
@@ -56,13 +65,6 @@ class RelativeModel(ABC):
     def dynamics(self, time: float, state: Array = ON_THE_CHIEF) -> Array:
         """(6, 6) continuous matrix A(t): the Jacobian of `derivative` with respect to the state, there."""
 
-    @abstractmethod
-    def bounded(self, time: float, state: Array) -> Array:
-        """(6,) state with the same position, its velocity changed so that the free motion does not drift.
-
-        Which components change, and what "bounded" means for the model, is stated with each.
-        """
-
     def transition(self, time: float, duration: float, state: Array = ON_THE_CHIEF) -> Array:
         """(6, 6) state transition matrix over `duration` from `time`, along the free motion from `state`."""
         return self.discretise(time, duration, state)[0]
@@ -70,15 +72,16 @@ class RelativeModel(ABC):
     def discretise(self, time: float, tick: float, state: Array = ON_THE_CHIEF) -> tuple[Array, Array]:
         """Exact discrete model x(t + tick) = Phi x(t) + Gamma u under an acceleration u held over the tick.
 
-        Returns Phi (6, 6) and Gamma (6, 3). For a nonlinear model: the derivatives of the state after the
-        tick with respect to the state before it and to u, along the free motion from `state`.
+        Held in the Hill frame, whose axes turn. Returns Phi (6, 6) and Gamma (6, 3). For a nonlinear model:
+        the derivatives of the state after the tick with respect to the state before it and to u, along the
+        free motion from `state`.
         """
         joint = np.zeros((6, 10))
         joint[:, 0] = state
         joint[:, 1:7] = np.eye(6)
 
         def rate(moment: float, columns: Array) -> Array:
-            result = np.empty_like(columns)
+            result = np.zeros_like(columns)
             if not self.is_linear:
                 result[:, 0] = self.derivative(moment, columns[:, 0])
             result[:, 1:] = self.dynamics(moment, columns[:, 0]) @ columns[:, 1:]
@@ -99,6 +102,21 @@ class RelativeModel(ABC):
             self.longest_step,
         )
 
+    def bounded(self, time: float, state: Array) -> Array:
+        """(6,) state whose along-track rate is such that the free motion does not drift along the track.
+
+        One condition for every model: after one period the along-track position is what it was. Position and
+        the other rates are those of `state`.
+        """
+        result = np.array(state, dtype=np.float64)
+        for _ in range(50):  # Newton; a linear model arrives in one step
+            drift = self.propagate(time, result, self.period)[1] - result[1]
+            change = -drift / self.transition(time, self.period, result)[1, 4]
+            result[4] += change
+            if self.is_linear or abs(change) <= 1e-14 * np.abs(result[3:]).max():
+                break
+        return result
+
 
 class LinearModel(RelativeModel):
     """A model whose right-hand side is `dynamics(t) x + B u`."""
@@ -112,30 +130,32 @@ class LinearModel(RelativeModel):
 
     def propagate(self, time: float, state: Array, duration: float, acceleration: Array = NO_THRUST) -> Array:
         """(..., 6) state after `duration` from a state (..., 6) under a held acceleration (..., 3)."""
-        free, forced = self.discretise(time, duration)
-        moved: Array = np.asarray(state) @ free.T
-        return moved + np.asarray(acceleration) @ forced.T
+        if acceleration is NO_THRUST:
+            free: Array = np.asarray(state) @ self.transition(time, duration).T
+            return free
+        phi, gamma = self.discretise(time, duration)
+        moved: Array = np.asarray(state) @ phi.T
+        return moved + np.asarray(acceleration) @ gamma.T
 
 
 def integrate(
     rate: Callable[[float, Array], Array], time: float, value: Array, duration: float, longest_step: float
 ) -> Array:
-    """Value after `duration` (either sign) of d(value)/dt = rate(t, value), in equal steps.
+    """Value after `duration` (either sign) of d(value)/dt = rate(t, value), in equal steps of order eight.
 
-    Dormand and Prince's method of order 8 (the tableau of SciPy's DOP853) with fixed steps: the same call
-    gives the same bits, smooth in its arguments; step control would give neither.
+    Fixed steps: the same call gives the same bits, smooth in its arguments; step control would give neither.
     """
     if duration == 0.0:
         return value
     steps = math.ceil(abs(duration) / longest_step)
     step = duration / steps
-    stages = np.empty((DOP853.n_stages, *value.shape))
-    weights = DOP853.A[: DOP853.n_stages, : DOP853.n_stages] * step
+    coupling, weights = COUPLING * step, WEIGHTS * step
+    stages = np.empty((STAGES, *value.shape))
     for index in range(steps):
-        start = time + index * step
-        stages[0] = rate(start, value)
-        for stage in range(1, DOP853.n_stages):
-            increment = np.tensordot(weights[stage, :stage], stages[:stage], 1)
-            stages[stage] = rate(start + DOP853.C[stage] * step, value + increment)
-        value = value + np.tensordot(DOP853.B * step, stages, 1)
+        moments = time + (index + INSTANTS) * step
+        stages[0] = rate(float(moments[0]), value)
+        for stage in range(1, STAGES):
+            change = np.tensordot(coupling[stage, :stage], stages[:stage], 1)
+            stages[stage] = rate(float(moments[INSTANT_OF_STAGE[stage]]), value + change)
+        value = value + np.tensordot(weights, stages, 1)
     return value

@@ -1,0 +1,98 @@
+"""State-dependent factorisations f(x) = A(x) x of the nonlinear equations of relative motion.
+
+Joshi's SDC1 and SDC2, and SDC1 with J2: the matrices that the state-dependent Riccati equation works with.
+They are factorisations to rounding error at every state, the chief itself included: where the source sums a
+truncated series, the closed form of the series stands here. All take states (..., 6) and give (..., 6, 6).
+"""
+
+import numpy as np
+
+from formation_gnc.orbit.constants import EARTH_RADIUS, J2
+from formation_gnc.relative.chief import ChiefState, frame_matrix
+from formation_gnc.relative.model import Array
+
+
+def sdc1(state: Array, chief: ChiefState) -> Array:
+    """Factorisation of the equations about an eccentric chief: Joshi (5.17)-(5.26), corrected.
+
+    Where the chief's plane tilts under J2, the frame's motion includes it.
+    """
+    state = np.asarray(state)
+    gradient, ratio = _growth(state, chief.radius)
+    matrix = np.broadcast_to(frame_matrix(chief), (*state.shape, 6)).copy()
+    attraction = (chief.mu / (chief.radius * ratio) ** 3)[..., None]
+    matrix[..., [3, 4, 5], [0, 1, 2]] -= attraction
+    # mu / r^2 - mu r / d^3 = -(mu / r^2) (s^-3 - 1), with s = d / r
+    matrix[..., 3, :3] -= chief.mu / chief.radius**2 * _power_difference(ratio, 3) * gradient
+    return matrix
+
+
+def sdc2(state: Array, chief: ChiefState) -> Array:
+    """Factorisation of the equations about a circular chief: Joshi (5.28)-(5.32).
+
+    The angular rate stands for the mean motion, as there: for an eccentric chief it is an approximation.
+    The printed sigma_x = (r / x + 1) sigma_y has no limit at x = 0 off the x axis; its numerator is spread
+    over the columns of x, y and z instead, which is the same f(x).
+    """
+    state = np.asarray(state)
+    rate = chief.angular_rate
+    gradient, ratio = _growth(state, chief.radius)
+    sigma_z = ratio**-3
+    sigma_y = -_power_difference(ratio, 3) * gradient  # (..., 3): sigma_y = 1 - s^-3 = this times [x, y, z]
+    matrix = np.zeros((*state.shape, 6))
+    matrix[..., [0, 1, 2], [3, 4, 5]] = 1.0
+    matrix[..., 3, :3] = rate**2 * (chief.radius + state[..., 0, None]) * sigma_y
+    matrix[..., 3, 4] = 2.0 * rate
+    matrix[..., 4, 3] = -2.0 * rate
+    matrix[..., 4, 1] = rate**2 * (1.0 - sigma_z)
+    matrix[..., 5, 2] = -(rate**2) * sigma_z
+    return matrix
+
+
+def sdc1_oblate(state: Array, chief: ChiefState) -> Array:
+    """SDC1 with differential J2: in the place of Joshi (5.34)-(5.55), exact."""
+    matrix = sdc1(state, chief)
+    matrix[..., 3:, :3] += oblateness(state, chief)
+    return matrix
+
+
+def oblateness(state: Array, chief: ChiefState) -> Array:
+    """(..., 3, 3) matrix G with G [x, y, z] the J2 acceleration of the deputy minus the chief's, exactly.
+
+    From a = -K { p / d^5 - 5 Z^2 p / d^7 + 2 Z k / d^5 }, K = (3/2) J2 mu Re^2, with p the place in the Hill
+    frame, d its length, k the pole and Z = k p, by the product rule for differences: each factor's difference
+    is a row vector times [x, y, z].
+    """
+    state = np.asarray(state)
+    r, pole = chief.radius, chief.pole
+    gradient, ratio = _growth(state, r)
+    place = state[..., :3] + np.array([r, 0.0, 0.0])
+    d5, d7 = ((r * ratio) ** -5.0)[..., None, None], ((r * ratio) ** -7.0)[..., None, None]
+    fifth = r**-5 * _power_difference(ratio, 5) * gradient  # d^-5 - r^-5 = this times [x, y, z]
+    seventh = r**-7 * _power_difference(ratio, 7) * gradient
+    height, height_of_chief = (place @ pole)[..., None], r * pole[0]
+    square = height**2 * seventh + r**-7 * (height + height_of_chief) * pole  # of Z^2 d^-7
+    radial = np.zeros((*state.shape[:-1], 3, 3))
+    radial[..., 0, :] = r * (fifth - 5.0 * square)
+    polar = 2.0 * pole[:, None] * (height * fifth + r**-5 * pole)[..., None, :]
+    isotropic = (d5 - 5.0 * height[..., None] ** 2 * d7) * np.eye(3)
+    result: Array = -1.5 * J2 * chief.mu * EARTH_RADIUS**2 * (isotropic + radial + polar)
+    return result
+
+
+def _growth(state: Array, radius: float) -> tuple[Array, Array]:
+    """Row vector c (..., 3) with c [x, y, z] = (d / r)^2 - 1, Joshi's -xi; ratio s = d / r (...,)."""
+    gradient = state[..., :3] / radius**2
+    gradient[..., 0] += 2.0 / radius
+    ratio = np.sqrt(1.0 + np.sum(gradient * state[..., :3], axis=-1))
+    return gradient, ratio
+
+
+def _power_difference(ratio: Array, power: int) -> Array:
+    """(s^-n - 1) / (s^2 - 1) as a column (..., 1), without dividing by zero at s = 1.
+
+    The closed form of Joshi's series: (3/2) psi xi = s^-3 - 1 in (5.25), 2 eta xi = s^-4 - 1 in (5.40).
+    """
+    total = sum(ratio**exponent for exponent in range(power))
+    result: Array = (-total / (ratio**power * (1.0 + ratio)))[..., None]
+    return result

@@ -1,0 +1,180 @@
+"""Gim and Alfriend's state transition matrix: J2 and an eccentric chief, through differences of elements."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.orbit.constants import EARTH_RADIUS, J2, MU
+from formation_gnc.orbit.elements import Elements, elements_from_state
+from formation_gnc.relative.chief import OblateChief
+from formation_gnc.relative.mean_elements import (
+    NodalElements,
+    mean_elements,
+    secular_rates,
+    short_period_jacobian,
+)
+from formation_gnc.relative.model import ON_THE_CHIEF, Array, LinearModel
+from formation_gnc.relative.oblate import OblateModel
+
+LOWEST_INCLINATION = 1e-3
+"""Inclination, rad, below which the elements that refer to the node lose too many digits."""
+
+
+@dataclass(frozen=True)
+class GimAlfriendModel(LinearModel):
+    """Linear relative motion under J2 about a chief of any eccentricity.
+
+    The state is Sigma(t) times the differences of osculating elements (Joshi (3.50), (3.51)); these are D(t)
+    times those of mean elements, which J2 changes at constant rates: Phi = Sigma D M D^-1 Sigma^-1. D is
+    the Jacobian of the first-order short-period perturbations, here from their generating function. The
+    long-period ones, singular at the critical inclination, are left out, and the chief's own osculating
+    elements are integrated, not taken from the theory: docs/theory/relative-motion.md.
+
+    Assumes: separation much smaller than the radius; no equatorial chief. Its error is of order J2^2.
+
+    Raises:
+        ConfigurationError: for an inclination within a milliradian of 0 or pi.
+    """
+
+    elements: Elements
+    """Osculating elements of the chief at time zero."""
+
+    def __post_init__(self) -> None:
+        """Refuse a chief without a node."""
+        if math.sin(self.elements.inclination) < LOWEST_INCLINATION:
+            raise ConfigurationError(
+                f"inclination is {self.elements.inclination} rad: the Gim-Alfriend model needs a node, "
+                f"at least {LOWEST_INCLINATION} rad from an equatorial orbit"
+            )
+
+    @property
+    def chief(self) -> OblateChief:
+        """The chief's orbit."""
+        return OblateChief(self.elements)
+
+    @property
+    def period(self) -> float:
+        """Nodal period of the chief, s."""
+        return self.chief.period
+
+    @property
+    def longest_step(self) -> float:
+        """Longest integration step, s, set by the chief's motion at its perigee."""
+        return self.chief.longest_step
+
+    def dynamics(self, time: float, state: Array = ON_THE_CHIEF) -> Array:
+        """(6, 6) continuous matrix A(t), exact: the Jacobian of the equations with J2, on the chief."""
+        return OblateModel(self.chief).dynamics(time)
+
+    def transition(self, time: float, duration: float, state: Array = ON_THE_CHIEF) -> Array:
+        """(6, 6) state transition matrix by the theory, to order J2 per revolution."""
+        start, end = self._osculating(time), self._osculating(time + duration)
+        mean = mean_elements(start)
+        phi: Array = (
+            _state_from_mean(end)
+            @ _secular_transition(mean, duration)
+            @ np.linalg.inv(_state_from_mean(start))
+        )
+        return phi
+
+    def discretise(self, time: float, tick: float, state: Array = ON_THE_CHIEF) -> tuple[Array, Array]:
+        """Phi (6, 6) by the theory, and Gamma (6, 3) by integration."""
+        _, gamma = super().discretise(time, tick)
+        return self.transition(time, tick), gamma
+
+    def bounded(self, time: float, state: Array) -> Array:
+        """(6,) state whose along-track rate makes the mean latitudes, nodes included, keep their distance."""
+        osculating = self._osculating(time)
+        mean = mean_elements(osculating)
+        slopes = _secular_slopes(mean)
+        drift = slopes[1] + math.cos(mean.inclination) * slopes[5]
+        row = drift @ np.linalg.inv(_state_from_mean(osculating))
+        result = np.array(state, dtype=np.float64)
+        result[4] -= row @ result / row[4]
+        return result
+
+    def _osculating(self, time: float) -> NodalElements:
+        return NodalElements.of(elements_from_state(self.chief.inertial(time)))
+
+
+def sigma(orbit: NodalElements) -> Array:
+    """(6, 6) map from differences of osculating elements [a, theta, i, q1, q2, Omega] to the relative state.
+
+    Joshi's Sigma(t) in (3.50), after Gim and Alfriend's geometry; theta is the true argument of latitude.
+    Free of J2, since the relative velocity leaves out the tilt of the plane (`formation_gnc.orbit.frames`).
+    """
+    theta, q1, q2 = orbit.latitude, orbit.q1, orbit.q2
+    sine, cosine = math.sin(theta), math.cos(theta)
+    sin_i, cos_i = math.sin(orbit.inclination), math.cos(orbit.inclination)
+    parameter = orbit.semi_major_axis * (1.0 - q1**2 - q2**2)
+    speed = math.sqrt(MU / parameter)
+    grown, slope = 1.0 + q1 * cosine + q2 * sine, q1 * sine - q2 * cosine
+    radius = parameter / grown
+    radial, transverse = speed * slope, speed * grown
+    a, t, i, x1, x2, node = np.eye(6)
+    of_parameter = a * parameter / orbit.semi_major_axis - 2.0 * orbit.semi_major_axis * (q1 * x1 + q2 * x2)
+    of_grown = cosine * x1 + sine * x2 - slope * t
+    of_slope = sine * x1 - cosine * x2 + (grown - 1.0) * t
+    turn_x = cosine * i + sin_i * sine * node
+    turn_y = -sine * i + sin_i * cosine * node
+    turn_z = t + cos_i * node
+    x = of_parameter / grown - radius / grown * of_grown
+    of_radial = speed * of_slope - 0.5 * radial / parameter * of_parameter
+    of_transverse = speed * of_grown - 0.5 * transverse / parameter * of_parameter
+    return np.array(
+        [
+            x,
+            radius * turn_z,
+            -radius * turn_y,
+            of_radial,
+            of_transverse + radial * turn_z - transverse / radius * x,
+            transverse * turn_x - radial * turn_y,
+        ]
+    )
+
+
+def _state_from_mean(osculating: NodalElements) -> Array:
+    """(6, 6) map from differences of mean elements to the relative state: Sigma D."""
+    by_mean_latitude, by_q1, by_q2 = osculating.latitude_slopes
+    to_true = np.eye(6)
+    to_true[1, [1, 3, 4]] = by_mean_latitude, by_q1, by_q2
+    short = np.eye(6) + short_period_jacobian(mean_elements(osculating))
+    result: Array = sigma(osculating) @ to_true @ short
+    return result
+
+
+def _secular_slopes(mean: NodalElements) -> Array:
+    """(6, 6) derivatives of the secular rates of [a, lambda, i, omega, -, Omega] by the mean elements."""
+    a, q1, q2, i = mean.semi_major_axis, mean.q1, mean.q2, mean.inclination
+    eta = math.sqrt(1.0 - q1**2 - q2**2)
+    n, s, cosine = math.sqrt(MU / a**3), math.sin(i) ** 2, math.cos(i)
+    e2 = 1.5 * J2 * (EARTH_RADIUS / (a * eta**2)) ** 2 * n
+    perigee, anomaly = 2.0 - 2.5 * s, 1.0 - 1.5 * s
+    by_s = 2.0 * math.sin(i) * cosine
+    slopes = np.zeros((6, 6))
+    slopes[3, 0] = -3.5 * e2 / a * perigee
+    slopes[3, 2] = -2.5 * e2 * by_s
+    slopes[5, 0] = 3.5 * e2 / a * cosine
+    slopes[5, 2] = e2 * math.sin(i)
+    slopes[1, 0] = -1.5 * n / a - 3.5 * e2 / a * (perigee + eta * anomaly)
+    slopes[1, 2] = -(2.5 + 1.5 * eta) * e2 * by_s
+    for column, q in ((3, q1), (4, q2)):
+        slopes[3, column] = 4.0 * e2 * q / eta**2 * perigee
+        slopes[5, column] = -4.0 * e2 * q / eta**2 * cosine
+        slopes[1, column] = slopes[3, column] + 3.0 * e2 * q / eta * anomaly
+    return slopes
+
+
+def _secular_transition(mean: NodalElements, duration: float) -> Array:
+    """(6, 6) transition matrix of differences of mean elements."""
+    turn = secular_rates(mean)[1] * duration
+    rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+    q1, q2 = rotation @ [mean.q1, mean.q2]
+    slopes = _secular_slopes(mean) * duration
+    transition = np.eye(6)
+    transition[[1, 5]] += slopes[[1, 5]]
+    transition[3:5, 3:5] = rotation
+    transition[3:5] += np.outer([-q2, q1], slopes[3])
+    return transition

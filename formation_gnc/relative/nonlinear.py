@@ -1,0 +1,50 @@
+"""The nonlinear equations of relative motion about an eccentric chief, and their Jacobian."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from formation_gnc.relative.chief import ChiefState, KeplerChief, frame_matrix
+from formation_gnc.relative.factorisation import sdc1
+from formation_gnc.relative.model import INPUT, NO_THRUST, ON_THE_CHIEF, Array, RelativeModel
+
+
+@dataclass(frozen=True)
+class NonlinearModel(RelativeModel):
+    """Exact relative motion of two satellites of point-mass gravity, at any separation and eccentricity.
+
+    Assumes: spherical Earth, a chief that does not manoeuvre. Source: Joshi (3.22)-(3.26) and (6.27)-(6.40),
+    with the corrections of docs/theory/errata.md.
+    """
+
+    chief: KeplerChief
+
+    is_linear = False
+
+    @property
+    def period(self) -> float:
+        """Period of the chief, s."""
+        return self.chief.period
+
+    @property
+    def longest_step(self) -> float:
+        """Longest integration step, s, set by the chief's motion at its perigee."""
+        return self.chief.longest_step
+
+    def derivative(self, time: float, state: Array, acceleration: Array = NO_THRUST) -> Array:
+        """(..., 6) right-hand side of Joshi (3.22), by the factorisation SDC1, which cancels no digits."""
+        free: Array = (sdc1(state, self.chief.at(time)) @ np.asarray(state)[..., None])[..., 0]
+        return free + np.asarray(acceleration) @ INPUT.T
+
+    def dynamics(self, time: float, state: Array = ON_THE_CHIEF) -> Array:
+        """(6, 6) Jacobian at the state: Joshi (6.27)-(6.40)."""
+        return jacobian(state, self.chief.at(time))
+
+
+def jacobian(state: Array, chief: ChiefState) -> Array:
+    """(6, 6) Jacobian of the equations with point-mass gravity at a relative state (6,)."""
+    place = np.array([chief.radius + state[0], state[1], state[2]])
+    square = float(place @ place)
+    matrix = frame_matrix(chief)
+    matrix[3:, :3] += chief.mu / square**1.5 * (3.0 / square * np.outer(place, place) - np.eye(3))
+    return matrix

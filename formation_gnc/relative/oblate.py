@@ -1,0 +1,96 @@
+"""Differential J2 in the Hill frame: the nonlinear equations with Earth's oblateness."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from formation_gnc.orbit.constants import EARTH_RADIUS, J2, MU
+from formation_gnc.orbit.elements import elements_from_state
+from formation_gnc.orbit.frames import inertial_from_relative
+from formation_gnc.relative.chief import Chief, ChiefState, OblateChief
+from formation_gnc.relative.factorisation import sdc1_oblate
+from formation_gnc.relative.mean_elements import NodalElements, mean_elements, secular_rates
+from formation_gnc.relative.model import INPUT, NO_THRUST, ON_THE_CHIEF, Array, RelativeModel
+from formation_gnc.relative.nonlinear import jacobian
+
+
+@dataclass(frozen=True)
+class OblateModel(RelativeModel):
+    """Relative motion of two satellites under point-mass gravity and J2.
+
+    Exact at any separation and eccentricity with an `OblateChief`. With a `KeplerChief` it is Joshi's model:
+    J2 acts on the difference of the two, while the chief keeps to its ellipse.
+
+    Assumes: no other force, a chief that does not manoeuvre. Source: Joshi (3.47), (3.48), with the
+    corrections of docs/theory/errata.md.
+    """
+
+    chief: Chief
+
+    is_linear = False
+
+    @property
+    def period(self) -> float:
+        """Period of the chief's argument of latitude, s."""
+        return self.chief.period
+
+    @property
+    def longest_step(self) -> float:
+        """Longest integration step, s, set by the chief's motion at its perigee."""
+        return self.chief.longest_step
+
+    def derivative(self, time: float, state: Array, acceleration: Array = NO_THRUST) -> Array:
+        """(..., 6) right-hand side, by the factorisation SDC1 with J2, which cancels no digits."""
+        free: Array = (sdc1_oblate(state, self.chief.at(time)) @ np.asarray(state)[..., None])[..., 0]
+        return free + np.asarray(acceleration) @ INPUT.T
+
+    def dynamics(self, time: float, state: Array = ON_THE_CHIEF) -> Array:
+        """(6, 6) Jacobian at the state: what Joshi (6.27)-(6.46) are meant to be."""
+        chief = self.chief.at(time)
+        matrix = jacobian(state, chief)
+        matrix[3:, :3] += oblate_gradient(state, chief)
+        return matrix
+
+    def bounded(self, time: float, state: Array) -> Array:
+        """(6,) state whose along-track rate makes the mean latitudes, nodes included, keep their distance.
+
+        The condition is on mean elements, since J2 turns the perigee of the relative orbit too: to come
+        back to the same place after one revolution would be to drift. Good to first order in J2; about a
+        `KeplerChief`, where no motion with J2 is bounded, the along-track position comes back after one
+        revolution.
+        """
+        if not isinstance(self.chief, OblateChief):
+            return super().bounded(time, state)
+        inertial = self.chief.inertial(time)
+        here = mean_elements(NodalElements.of(elements_from_state(inertial)))
+        latitude_rate, _, node_rate = secular_rates(here)
+        cosine, radius = math.cos(here.inclination), self.chief.at(time).radius
+        speed = radius * self.chief.at(time).angular_rate
+        slope = -3.0 * speed / math.sqrt(MU * here.semi_major_axis)  # of n by vy: -3 n a v / mu
+        result = np.array(state, dtype=np.float64)
+        for _ in range(50):  # the slope is that without J2: each round gains two digits or more
+            deputy = elements_from_state(inertial_from_relative(inertial, result))
+            latitude, _, node = secular_rates(mean_elements(NodalElements.of(deputy)))
+            change = -(latitude - latitude_rate + cosine * (node - node_rate)) / slope
+            result[4] += change
+            if abs(change) < 1e-13:
+                break
+        return result
+
+
+def oblate_gradient(state: Array, chief: ChiefState) -> Array:
+    """(3, 3) gradient of the J2 acceleration at the deputy, in the chief's Hill frame."""
+    place = np.array([chief.radius + state[0], state[1], state[2]])
+    square = float(place @ place)
+    unit = place / square**0.5
+    sine = float(unit @ chief.pole)
+    cross = np.outer(unit, chief.pole)
+    strength = 1.5 * J2 * chief.mu * EARTH_RADIUS**2 / square**2.5
+    gradient: Array = -strength * (
+        (1.0 - 5.0 * sine**2) * np.eye(3)
+        + 5.0 * (7.0 * sine**2 - 1.0) * np.outer(unit, unit)
+        - 10.0 * sine * (cross + cross.T)
+        + 2.0 * np.outer(chief.pole, chief.pole)
+    )
+    return gradient
