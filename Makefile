@@ -4,6 +4,8 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 
 in_environment := source ./env.sh &&
+# An installed ROS puts pytest plug-ins of its own in the way.
+pytest := python -m pytest --disable-plugin-autoload -p pytest_randomly -p pytest_timeout -p _hypothesis_pytestplugin
 
 .PHONY: help setup demo test check bench verify lock clean force
 
@@ -26,17 +28,17 @@ check: setup
 	@$(in_environment) ruff check . && ruff format --check . && mypy
 
 test: check
-	@$(in_environment) python -m pytest -m "not slow"
+	@$(in_environment) $(pytest) --timeout 300 -m "not slow"
 
 bench: setup
 	@$(in_environment) python -m bench
 
 verify: .venv/.verify
-	@$(in_environment) python -m pytest -m slow && python -m verification
+	@$(in_environment) $(pytest) -m slow && python -m verification
 
 # Which ROS, and for which place: a change of either is a new environment.
 .ros: force
-	@ros=$$(tools/find_ros.sh) && line="$$ros for $(CURDIR)" && [[ $$line == "$$(cat $@ 2>/dev/null)" ]] || echo "$$line" > $@
+	@ros=$$(tools/find_ros.sh) || exit; here="$$ros for $(CURDIR)"; [[ $$here == "$$(cat $@ 2>&1)" ]] || echo "$$here" > $@
 
 .venv/.ready: .ros requirements.lock tools/make_venv.sh tools/ros_prefix.py
 	@tools/make_venv.sh

@@ -12,10 +12,7 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
-        (
-            "bin",
-            ["scripts/formation-gnc"],
-        ),  # on PATH in an environment that colcon sets up; the nodes are not
+        ("bin", ["scripts/formation-gnc"]),  # colcon puts bin on PATH, and leaves the nodes off it
         (f"share/{NAME}/params", sorted(str(path) for path in Path("params").glob("*.yaml"))),
         (f"share/{NAME}/launch", sorted(str(path) for path in Path("launch").glob("*.py"))),
     ],
@@ -23,7 +20,7 @@ setup(
     zip_safe=True,
     maintainer="formation_gnc maintainers",
     maintainer_email="maintainers@example.org",
-    description="Guidance, navigation and control of satellites in formation, as a lock-step ROS 2 node graph.",
+    description="Formation-flying GNC as a lock-step ROS 2 node graph.",
     license="Apache-2.0",
     extras_require={"test": ["pytest"]},
     entry_points={"console_scripts": [f"{node} = {NAME}.nodes.{node}:main" for node in NODES]},

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds both packages with colcon into install/, on the ROS that .venv was made for.
-set -eo pipefail
+# Builds both packages with colcon into install/, on the ROS 2 that .venv was made for.
+set -eo pipefail  # no -u: the scripts of ROS read unset variables
 cd "$(dirname "$0")/.."
 
 read -r ros _ < .ros
@@ -10,4 +10,5 @@ if [[ $ros == wheels ]]; then
 elif [[ :${AMENT_PREFIX_PATH:-}: != *:$ros:* ]]; then
     source "$ros/setup.bash"
 fi
-.venv/bin/python -m colcon build --event-handlers desktop_notification- status-
+PATH=$PWD/.venv/bin:$PATH  # CMake takes the Python that it finds first
+colcon build --event-handlers desktop_notification- status-

@@ -1,72 +1,81 @@
 #!/usr/bin/env bash
-# Makes .venv anew, with everything that requirements.lock names: ROS 2 itself included, unless the machine has it.
+# Makes .venv anew, with everything that requirements.lock names: ROS 2 too, unless the machine has it.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-read -r ros _ < .ros  # the prefix of the ROS in use, or "wheels"
+read -r ros _ < .ros  # the prefix of the ROS 2 in use, or "wheels"
 
 fail() {
     echo "formation_gnc: $*" >&2
     exit 2
 }
 
-# Runs on any Python 3: "right", what is missing, or "other" for another version.
+# Runs on any Python 3 and says "right <path>", or what is missing, or nothing for another version.
 appraise='
 import importlib.util, os, sys, sysconfig
-if sys.version_info[:2] != (3, 12):
-    print("other")
-elif not os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h")):
-    print("headers")
-elif not importlib.util.find_spec("ensurepip"):
-    print("venv")
-elif len(sys.argv) > 1 and not importlib.util.find_spec(sys.argv[1]):
-    print(sys.argv[1])
-else:
-    print("right")
+if sys.version_info[:2] == (3, 12):
+    if not os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h")):
+        print("headers")
+    elif not importlib.util.find_spec("ensurepip"):
+        print("venv")
+    elif "rclpy" in sys.argv and not importlib.util.find_spec("rclpy"):
+        print("rclpy")
+    else:
+        print("right", sys._base_executable)
 '
 
-find_python() { # [module it must have]
-    local candidate verdict missing=""
-    for candidate in python3.12 python3 /usr/bin/python3 "${PYENV_ROOT:-$HOME/.pyenv}"/versions/3.12*/bin/python3.12 \
-        "$(uv python find 3.12 2> /dev/null || true)"; do
-        # A pyenv shim is on PATH for versions that are not active too, and then fails.
-        verdict=$("$candidate" -c "$appraise" "$@" 2> /dev/null) || continue
-        case $verdict in
-            right) "$candidate" -c 'import sys; print(sys.executable)' && return ;;
-            other) ;;
-            *) missing=${missing:-$verdict} ;;
-        esac
+find_python() { # of these candidates; [rclpy, if it must have that]
+    local candidate verdict path missing=""
+    for candidate in "${candidates[@]}"; do
+        # A pyenv shim stands on PATH for inactive versions too, and fails.
+        read -r verdict path < <("$candidate" -c "$appraise" "$@" 2> /dev/null) || continue
+        if [[ $verdict == right ]]; then
+            echo "$path"
+            return
+        fi
+        missing=${missing:-$verdict}
     done
     case $missing in
-        headers) fail "Python 3.12 is here without its headers: install python3.12-dev." ;;
-        venv) fail "Python 3.12 is here without venv: install python3.12-venv." ;;
-        "") fail "no Python 3.12 found: install python3.12, python3.12-dev and python3.12-venv (or: uv python install 3.12)." ;;
-        *) fail "ROS 2 at $ros is here without its Python package $missing: install ros-jazzy-$missing." ;;
+        headers) fail "Python 3.12 lacks its headers: install python3.12-dev." ;;
+        venv) fail "Python 3.12 lacks venv: install python3.12-venv." ;;
+        rclpy) fail "the ROS 2 Jazzy in $ros lacks rclpy: install ros-jazzy-rclpy." ;;
+        *) fail "no Python 3.12: install python3.12, python3.12-dev and python3.12-venv, or run 'uv python install 3.12'." ;;
     esac
 }
 
-command -v "${CXX:-c++}" > /dev/null && command -v "${CC:-cc}" > /dev/null || fail "no C++ compiler found: install g++."
+for compiler in "${CC:-cc}" "${CXX:-c++}"; do
+    command -v "$compiler" > /dev/null || fail "no C++ compiler ($compiler): install g++."
+done
 
 if [[ $ros == wheels ]]; then
+    candidates=(python3.12 python3 "${PYENV_ROOT:-$HOME/.pyenv}"/versions/3.12*/bin/python3.12)
+    ! command -v uv > /dev/null || candidates+=("$(uv python find 3.12 2> /dev/null || true)")
     python=$(find_python)
     options=()
-    wanted='.'
+    left_out='^$'
 else
-    [[ :${AMENT_PREFIX_PATH:-}: == *:$ros:* ]] || { set +u; source "$ros/setup.bash"; set -u; }
+    if [[ :${AMENT_PREFIX_PATH:-}: != *:$ros:* ]]; then
+        set +u
+        source "$ros/setup.bash"
+        set -u
+    fi
+    candidates=(/usr/bin/python3 python3 python3.12)
     python=$(find_python rclpy)
     options=(--system-site-packages)
-    wanted='^([^r]|r[^o]|ro[^s]|ros[^-])'
+    left_out='^(ros-|catkin-pkg=|empy=|lark-parser=)'  # an installed ROS brings its own
 fi
 
 echo "formation_gnc: making .venv with $python (a minute or two, once)"
-rm -rf .venv build/formation_gnc build/formation_gnc_msgs install  # what was built names the old one
+rm -rf .venv build/formation_gnc build/formation_gnc_msgs install  # what was built on the old one goes with it
 "$python" -m venv "${options[@]}" .venv
 
-install() { # pattern of the names to take from the lock
-    awk -v names="$1" '/^[^ #]/ { keep = $0 ~ names } keep' requirements.lock > .venv/requirements.txt
+install() { # awk condition on the lines of the lock that name a package
+    awk '/^[^ #]/ { keep = '"$1"' } keep' requirements.lock > .venv/requirements.txt
     # The lock is complete, so there is nothing to resolve.
     .venv/bin/python -m pip install -qq --disable-pip-version-check --require-hashes --no-deps \
         --no-build-isolation --requirement .venv/requirements.txt
 }
-install '^setuptools=='  # builds empy, which comes as source only
-install "$wanted"
-if [[ $ros == wheels ]]; then .venv/bin/python tools/ros_prefix.py; fi
+install '/^setuptools=/'  # first: it builds empy, the only one that comes as source
+install "!/$left_out/"
+if [[ $ros == wheels ]]; then
+    .venv/bin/python tools/ros_prefix.py
+fi
