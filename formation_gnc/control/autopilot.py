@@ -36,7 +36,8 @@ ControllerParameters: Any = make_dataclass(
 class Autopilot(Part[Any, Controller]):
     """Asks the law in use at every tick and holds its answer inside the limits.
 
-    A command is finite and within the limit whatever the law returns; what had to be changed is in the status.
+    A command is finite and within the limit whatever the law returns; what had to be changed is in the
+    status.
     """
 
     def __init__(self, name: str, parameters: Any) -> None:
@@ -53,7 +54,7 @@ class Autopilot(Part[Any, Controller]):
 
     def take_over(self, old: Configuration[Any, Controller], new: Configuration[Any, Controller]) -> None:
         """Tell the new law what flew before."""
-        new.design.take_over(Handover(self._force, old.parameters.algorithm))
+        new.design.take_over(Handover(self._force, old.parameters.algorithm, old.design))
 
     def on_tick(self, estimate: Estimate, target: Target) -> tuple[Thrust, Status]:
         """The command for the tick that begins at the estimate's stamp, and how it came about."""

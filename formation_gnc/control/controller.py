@@ -31,6 +31,8 @@ class Handover:
     """(3,) force commanded over the tick before, Hill frame, N."""
     algorithm: str
     """Name of the law that commanded it; the own name when only parameters changed."""
+    law: "Controller | None" = None
+    """That law itself, whose memory one of the same kind may go on with."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +48,9 @@ class Vehicle:
 class Controller(ABC):
     """A control law: designed off the cycle, asked at every tick.
 
-    A subclass's docstring says what the law does, what it assumes and where it comes from; its `Parameters` are a frozen
-    dataclass of :func:`formation_gnc.parameters.parameter` fields, and become the controller node's parameters under the law's
-    name in the registry.
+    A subclass's docstring says what the law does, what it assumes and where it comes from; its `Parameters`
+    are a frozen dataclass of :func:`formation_gnc.parameters.parameter` fields, and become the controller
+    node's parameters under the law's name in the registry.
     """
 
     Parameters: ClassVar[type]
@@ -67,4 +69,3 @@ class Controller(ABC):
     @abstractmethod
     def command(self, estimate: Estimate, target: Target) -> Command:
         """The force for the tick that begins at the estimate's stamp."""
-

@@ -3,77 +3,248 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import LinAlgError, solve_discrete_are
 
-from formation_gnc.control.controller import Command, Controller, Vehicle
+from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
+from formation_gnc.control.feed_forward import FeedForward
+from formation_gnc.control.models import DESIGN_MODELS
+from formation_gnc.control.riccati import (
+    Weights,
+    continuous_gain,
+    finite_gains,
+    periodic_gains,
+    stationary_gain,
+)
 from formation_gnc.errors import DesignError
-from formation_gnc.interface import Estimate, Matrix, Target
+from formation_gnc.interface import NANOSECONDS, Estimate, Matrix, Target, Vector
 from formation_gnc.mission import Mission
 from formation_gnc.parameters import parameter
-from formation_gnc.relative.hill import HillModel
+from formation_gnc.relative.model import RelativeModel
+
+STRETCHES = 180
+"""Stretches of an orbit (2 degrees each) over which a time-varying model is taken as constant in the
+design."""
+
+MOST_STEPS = 50_000
+"""Ticks of the longest finite horizon: a few seconds of design."""
 
 
 @dataclass(frozen=True)
 class LqrParameters:
-    """Weights by Bryson's rule: each is the size that costs as much as any other."""
+    """Weights by Bryson's rule, each the size that costs as much as any other, or as matrices; and which
+    gain."""
 
+    model: str = parameter(
+        "hill",
+        choices=tuple(DESIGN_MODELS),
+        in_flight=True,
+        doc="relative motion that the gain is designed on",
+    )
+    gain: str = parameter(
+        "discrete",
+        choices=("discrete", "continuous", "frozen", "periodic", "finite"),
+        in_flight=True,
+        doc="discrete or continuous: one gain for ever; frozen: that of the model as it is at each point of the "
+        "orbit (Roberts); periodic: optimal over all orbits; finite: optimal up to final_time, then as discrete",
+    )
+    final_time: float = parameter(
+        0.0, unit="s", minimum=0.0, in_flight=True, doc="horizon of the finite gain, from where it takes over"
+    )
+    terminal_weight: float = parameter(
+        1.0, minimum=0.0, in_flight=True, doc="state weight at the final time over that of one tick"
+    )
     position_error: tuple[float, ...] = parameter(
-        (1.0, 1.0, 1.0), unit="m", length=3, above=0.0, in_flight=True, doc="position error that weighs one, per Hill axis"
+        (1.0, 1.0, 1.0),
+        unit="m",
+        length=3,
+        above=0.0,
+        in_flight=True,
+        doc="position error that weighs one, per Hill axis",
     )
     velocity_error: tuple[float, ...] = parameter(
-        (0.01, 0.01, 0.01), unit="m/s", length=3, above=0.0, in_flight=True, doc="velocity error that weighs one, per Hill axis"
+        (0.01, 0.01, 0.01),
+        unit="m/s",
+        length=3,
+        above=0.0,
+        in_flight=True,
+        doc="velocity error that weighs one, per Hill axis",
     )
     thrust: tuple[float, ...] = parameter(
-        (0.01, 0.01, 0.01), unit="N", length=3, above=0.0, in_flight=True, doc="force that weighs one, per Hill axis"
+        (0.01, 0.01, 0.01),
+        unit="N",
+        length=3,
+        above=0.0,
+        in_flight=True,
+        doc="force that weighs one, per Hill axis",
+    )
+    integral_error: float = parameter(
+        0.0,
+        unit="m s",
+        minimum=0.0,
+        in_flight=True,
+        doc="integral of position error that weighs one; 0 for no integral",
+    )
+    state_weight: tuple[float, ...] = parameter(
+        (),
+        in_flight=True,
+        doc="weight Q (6 x 6, row by row, SI) in place of position_error and velocity_error",
+    )
+    thrust_weight: tuple[float, ...] = parameter(
+        (), unit="1/N^2", in_flight=True, doc="weight R on force (3 x 3, row by row) in place of thrust"
+    )
+    feed_forward: str = parameter(
+        "none",
+        choices=("none", "linear", "nonlinear"),
+        in_flight=True,
+        doc="what the target asks beyond free motion: none, by the model above, or by the exact one with J2; "
+        "takes a preview of the target",
     )
 
 
 class LinearQuadraticRegulator(Controller):
-    """Discrete infinite-horizon LQR on Hill's equations.
+    """LQR on a linear relative-motion model.
 
-    Tracks the target: u = -K (x - x_target), with K from the discrete algebraic Riccati equation
-    (Neokleous 4.29-4.30, sign of 4.33 corrected) for Hill's equations, exactly discretised over a tick with held thrust.
+    Tracks the target: u = -K (x - x_target) + feed-forward, with K from a Riccati equation (Neokleous
+    4.29-4.30, sign of 4.33 corrected; Roberts 38-40) for a model discretised exactly with thrust held over a
+    tick. A gain that varies along the orbit is tabulated when it is designed and interpolated in flight.
 
-    Assumes: near-circular chief, separation much smaller than its radius, a target that needs little thrust to follow.
+    With `integral_error`, the integral of the position error is a seventh to ninth state; an axis at its
+    thrust limit does not integrate, and a change of parameters keeps the integral.
+
+    Assumes: separation much smaller than the chief's radius; what the model assumes.
     """
 
     Parameters = LqrParameters
 
     def __init__(self, parameters: LqrParameters, mission: Mission, vehicle: Vehicle) -> None:
-        """Solve for the gain; raises DesignError when the Riccati equation has no stabilising solution."""
-        model = HillModel(mission.mean_motion)
-        phi, gamma = model.discretise(0.0, mission.tick)
-        errors = np.array(parameters.position_error + parameters.velocity_error)
-        accelerations = np.array(parameters.thrust) / vehicle.mass
-        self.gain = lqr_gain(phi, gamma, np.diag(errors**-2.0), np.diag(accelerations**-2.0))
+        """Solve for the gains.
+
+        Raises:
+            DesignError: inadmissible weights, a gain that the model does not have, or no stabilising
+            solution.
+        """
+        model = DESIGN_MODELS[parameters.model](mission)
+        self._tick = mission.tick
+        self._limit = vehicle.thrust_limit
+        self._integrates = parameters.integral_error > 0.0
+        self._feed_forward = FeedForward(parameters.feed_forward, model)
+        self._integral = np.zeros(3)
+        self._start: int | None = None
+        state_weight, thrust_weight = weight_matrices(parameters)
+        try:
+            self._design(
+                parameters, model, Weights.scaled(state_weight, vehicle.mass**2 * thrust_weight, mission.tick)
+            )
+        except DesignError as error:
+            raise DesignError(f"lqr: {error}") from error
+
+    def _design(self, parameters: LqrParameters, model: RelativeModel, weights: Weights) -> None:
+        """Set `gain` (3, n), or the table `gains` (N, 3, n) at intervals of `interval` s."""
+        tick = self._tick
+        self.gains = np.empty((0, 3, 6))
+        self.interval = tick
+        self._finite = parameters.gain == "finite"
+        if not model.is_time_invariant:
+            if parameters.gain not in ("frozen", "periodic"):
+                raise DesignError(
+                    f"the model {parameters.model} varies along the orbit; "
+                    f"gain must be frozen or periodic, not {parameters.gain}"
+                )
+            self.interval = model.period / STRETCHES
+            middles = self.interval * (np.arange(STRETCHES) + 0.5)
+            models = [self._discretise(model, float(middle)) for middle in middles]
+            if parameters.gain == "frozen":
+                self.gains = np.array([stationary_gain(phi, gamma, weights) for phi, gamma in models])
+            else:
+                self.gains = periodic_gains(models, max(1, round(self.interval / tick)), weights)
+            self.gain = self.gains.mean(axis=0)
+        elif parameters.gain == "continuous":
+            self.gain = continuous_gain(*self._augmented(model.dynamics(0.0), model.INPUT), weights)
+        else:
+            phi, gamma = self._discretise(model, 0.0)
+            self.gain = stationary_gain(phi, gamma, weights)
+            if self._finite:
+                steps = round(parameters.final_time / tick)
+                if not 1 <= steps <= MOST_STEPS:
+                    allowed = f"it must be 1 to {MOST_STEPS} ticks of {tick} s"
+                    raise DesignError(f"final_time is {parameters.final_time} s; {allowed}")
+                terminal = np.zeros((len(phi), len(phi)))
+                terminal[:6, :6] = parameters.terminal_weight * weight_matrices(parameters)[0][:6, :6]
+                self.gains = finite_gains(phi, gamma, weights, terminal, steps)
+
+    def _discretise(self, model: RelativeModel, time: float) -> tuple[Matrix, Matrix]:
+        phi, gamma = model.discretise(time, self._tick)
+        return self._augmented(phi, gamma, np.eye(3), self._tick)
+
+    def _augmented(
+        self, dynamics: Matrix, inputs: Matrix, kept: Matrix | float = 0.0, rate: float = 1.0
+    ) -> tuple[Matrix, Matrix]:
+        """Append the integral of position when there is one."""
+        if not self._integrates:
+            return dynamics, inputs
+        joint = np.zeros((9, 9))
+        joint[:6, :6] = dynamics
+        joint[6:, 6:] = kept
+        joint[6:, :3] = rate * np.eye(3)
+        return joint, np.vstack([inputs, np.zeros((3, 3))])
+
+    def gain_at(self, time: int) -> Matrix:
+        """Gain K (3, n) in force at a time of the run (ns): acceleration per m, m/s and m s of error."""
+        if not len(self.gains):
+            return self.gain
+        if self._finite:
+            step = (time - (time if self._start is None else self._start)) // round(self._tick * NANOSECONDS)
+            return self.gains[step] if step < len(self.gains) else self.gain
+        place = time / NANOSECONDS / self.interval - 0.5
+        index = int(np.floor(place))
+        share, size = place - index, len(self.gains)
+        gain: Matrix = (1.0 - share) * self.gains[index % size] + share * self.gains[(index + 1) % size]
+        return gain
+
+    def take_over(self, handover: Handover) -> None:
+        """Keep the integral of an LQR that flew before."""
+        if self._integrates and isinstance(handover.law, LinearQuadraticRegulator):
+            self._integral = handover.law._integral.copy()
 
     def command(self, estimate: Estimate, target: Target) -> Command:
-        """The force that the gain asks for against the estimated error."""
+        """The force that the gain asks for against the estimated error, and what the target needs."""
+        if self._start is None:
+            self._start = estimate.time
+        gain = self.gain_at(estimate.time)
         error = estimate.relative_state - target.relative_state
-        return Command(-estimate.mass * (self.gain @ error))
+        acceleration = -gain[:, :6] @ error
+        if self._integrates:
+            acceleration -= gain[:, 6:] @ self._integral
+        wanted, reason = self._feed_forward(estimate, target)
+        force = estimate.mass * (acceleration + wanted)
+        if self._integrates:
+            # Anti-wind-up: what an axis at its limit cannot give, more integral would not get.
+            self._integral += np.where(np.abs(force) < self._limit, error[:3], 0.0) * self._tick
+        return Command(force, fallback=reason)
 
 
-def lqr_gain(phi: Matrix, gamma: Matrix, state_weight: Matrix, input_weight: Matrix) -> Matrix:
-    """Gain K (3, 6) of the discrete infinite-horizon LQR u = -K x for x' = phi x + gamma u.
-
-    Minimises the sum of x' Q x + u' R u. Solved in units of the weights themselves, since SI numbers of orbital motion span
-    ten orders of magnitude and the Riccati solver would fail on them.
+def weight_matrices(parameters: LqrParameters) -> tuple[Matrix, Matrix]:
+    """Q (6, 6), or (9, 9) with the integral of position, and R (3, 3) on force, in SI units.
 
     Raises:
-        DesignError: no stabilising solution.
+        DesignError: a matrix with the wrong number of elements.
     """
-    state_scale = np.sqrt(np.diag(state_weight))
-    input_scale = np.sqrt(np.diag(input_weight))
-    scaled_phi = phi * np.outer(state_scale, 1.0 / state_scale)
-    scaled_gamma = gamma * np.outer(state_scale, 1.0 / input_scale)
-    q = state_weight / np.outer(state_scale, state_scale)
-    r = input_weight / np.outer(input_scale, input_scale)
-    try:
-        p = solve_discrete_are(scaled_phi, scaled_gamma, q, r)
-    except (LinAlgError, ValueError) as error:
-        raise DesignError(f"lqr: no stabilising gain for these weights ({error})") from error
-    scaled_gain = np.linalg.solve(r + scaled_gamma.T @ p @ scaled_gamma, scaled_gamma.T @ p @ scaled_phi)
-    if np.abs(np.linalg.eigvals(scaled_phi - scaled_gamma @ scaled_gain)).max() >= 1.0:
-        raise DesignError("lqr: the closed loop of these weights is not stable")
-    gain: Matrix = scaled_gain * np.outer(1.0 / input_scale, state_scale)
-    return gain
+    error = np.array(parameters.position_error + parameters.velocity_error)
+    q = _matrix("state_weight", parameters.state_weight, 6, error)
+    r = _matrix("thrust_weight", parameters.thrust_weight, 3, np.array(parameters.thrust))
+    if parameters.integral_error > 0.0:
+        joint = np.zeros((9, 9))
+        joint[:6, :6] = q
+        joint[6:, 6:] = np.eye(3) / parameters.integral_error**2
+        q = joint
+    return q, r
+
+
+def _matrix(name: str, values: tuple[float, ...], size: int, allowed: Vector) -> Matrix:
+    """The matrix that is given, or Bryson's rule."""
+    if not values:
+        return np.diag(allowed**-2.0)
+    if len(values) != size**2:
+        raise DesignError(
+            f"lqr: {name} has {len(values)} values; it must have {size**2} ({size} rows of {size})"
+        )
+    return np.array(values).reshape(size, size)

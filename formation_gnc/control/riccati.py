@@ -1,0 +1,248 @@
+"""Riccati equations of linear quadratic control, solved by doubling.
+
+One step of the backward recursion is a map of the cost-to-go P,
+
+    P -> H + A' P (I + G P)^-1 A,   with H = Q and G = B R^-1 B',
+
+and two such maps after one another are again such a map. So a thousand equal steps cost ten compositions, a
+whole orbit of unequal ones is one map, and the stabilising solution is what doubling converges to:
+quadratically, without ordering eigenvalues (Chu, Fan, Lin and Wang 2004, the structure-preserving doubling
+algorithm).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import reduce
+
+import numpy as np
+from scipy.linalg import LinAlgError, solve_continuous_are
+
+from formation_gnc.errors import DesignError
+from formation_gnc.interface import Matrix, Vector
+
+LARGEST_DOUBLING = 60
+"""Doublings after which a solution that has not converged does not exist: 2^60 steps."""
+
+
+@dataclass(frozen=True)
+class RiccatiMap:
+    """The backward recursion over any number of steps: cost-to-go at their end to cost-to-go at their
+    start."""
+
+    transition: Matrix
+    """(n, n) A: how the state passes under the optimal thrust when nothing is at stake afterwards."""
+    reach: Matrix
+    """(n, n) G: what the thrust can reach per unit of its cost."""
+    cost: Matrix
+    """(n, n) H: cost-to-go at the start when nothing is at stake afterwards."""
+
+    @classmethod
+    def of_step(cls, phi: Matrix, gamma: Matrix, state_weight: Matrix, input_weight: Matrix) -> "RiccatiMap":
+        """One step of x' = phi x + gamma u with the cost x' Q x + u' R u."""
+        return cls(phi, gamma @ np.linalg.solve(input_weight, gamma.T), state_weight)
+
+    def then(self, later: "RiccatiMap") -> "RiccatiMap":
+        """These steps and then the later ones."""
+        size = len(self.cost)
+        both = np.linalg.solve(
+            np.eye(size) + self.reach @ later.cost, np.hstack([self.transition, self.reach])
+        )
+        onward, spread = both[:, :size], both[:, size:]
+        reach = later.reach + later.transition @ spread @ later.transition.T
+        cost = self.cost + self.transition.T @ later.cost @ onward
+        return RiccatiMap(later.transition @ onward, 0.5 * (reach + reach.T), 0.5 * (cost + cost.T))
+
+    def repeated(self, times: int) -> "RiccatiMap":
+        """These steps, one or more times over."""
+        if times == 1:
+            return self
+        half = self.repeated(times // 2)
+        twice = half.then(half)
+        return twice.then(self) if times % 2 else twice
+
+    def backward(self, cost_to_go: Matrix) -> Matrix:
+        """(n, n) cost-to-go at the start for a cost-to-go at the end."""
+        size = len(self.cost)
+        result = self.cost + self.transition.T @ cost_to_go @ np.linalg.solve(
+            np.eye(size) + self.reach @ cost_to_go, self.transition
+        )
+        return 0.5 * (result + result.T)
+
+    def stabilising(self) -> Matrix:
+        """(n, n) cost-to-go when these steps are repeated for ever.
+
+        Raises:
+            DesignError: the thrust cannot stabilise what the weights see.
+        """
+        power = self
+        for _ in range(LARGEST_DOUBLING):
+            with np.errstate(all="ignore"):
+                try:
+                    twice = power.then(power)
+                except LinAlgError:
+                    break
+            if not np.isfinite(twice.cost).all():
+                break
+            change = np.abs(twice.cost - power.cost).max()
+            power = twice
+            if change <= 1e-14 * np.abs(twice.cost).max():
+                return twice.cost
+        raise DesignError("the Riccati equation has no stabilising solution for these weights")
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Cost x' Q x + u' R u of one step, in units in which states, inputs and cost are all of order one.
+
+    SI numbers of orbital motion span ten orders of magnitude, and no Riccati solver stands that. So a state
+    counts in units of length, length times rate, and length over rate for an integral; the rate is about the
+    closed loop's bandwidth.
+    """
+
+    state: Matrix
+    """(n, n) scaled Q."""
+    input: Matrix
+    """(m, m) scaled R."""
+    state_unit: Vector
+    """(n,) SI size of one scaled state."""
+    input_unit: Vector
+    """(m,) SI size of one scaled input."""
+    cost_unit: float
+    """SI size of one scaled cost."""
+
+    @classmethod
+    def scaled(cls, state_weight: Matrix, input_weight: Matrix, tick: float) -> "Weights":
+        """Choose units for SI weights Q (6, 6), or (9, 9) with the integral of position, and R (3, 3) on
+        acceleration.
+
+        Raises:
+            DesignError: Q has a negative eigenvalue, or R one that is not positive.
+        """
+        for name, weight, least in (("state", state_weight, 0.0), ("thrust", input_weight, 1e-12)):
+            size = np.sqrt(np.maximum(np.diag(weight), 0.0))
+            size[size == 0.0] = 1.0
+            normal = weight / np.outer(size, size)
+            if not np.isfinite(normal).all() or np.abs(normal - normal.T).max() > 1e-9:
+                raise DesignError(f"the {name} weight is not a symmetric matrix of finite numbers")
+            smallest = np.linalg.eigvalsh(normal).min()
+            if smallest < least - 1e-9 * (least == 0.0):
+                allowed = "zero or more" if least == 0.0 else "above zero"
+                raise DesignError(
+                    f"the {name} weight has a normalised eigenvalue of {smallest:.3g}; all must be {allowed}"
+                )
+        thrust = np.sqrt(np.diag(input_weight))
+        position, velocity, integral = (
+            np.sqrt(np.diag(state_weight))[index : index + 3].max(initial=0.0) / thrust.min()
+            for index in (0, 3, 6)
+        )
+        rate = max(position**0.5, velocity, integral ** (1.0 / 3.0))
+        if rate == 0.0:
+            raise DesignError("the state weight is zero: nothing to control")
+        rate = min(rate, 1.0 / tick)
+        # The unit of length is free: one unit of acceleration at this rate.
+        state_unit = np.repeat([1.0, rate, 1.0 / rate], 3)[: len(state_weight)]
+        input_unit = np.full(3, rate**2)
+        cost = (thrust**2).min() * rate**4
+        return cls(
+            state_weight * np.outer(state_unit, state_unit) / cost,
+            input_weight * np.outer(input_unit, input_unit) / cost,
+            state_unit,
+            input_unit,
+            cost,
+        )
+
+    def step(self, phi: Matrix, gamma: Matrix) -> tuple[Matrix, Matrix]:
+        """Scaled phi and gamma of SI ones."""
+        return (
+            phi * np.outer(1.0 / self.state_unit, self.state_unit),
+            gamma * np.outer(1.0 / self.state_unit, self.input_unit),
+        )
+
+    def map(self, phi: Matrix, gamma: Matrix) -> RiccatiMap:
+        """The recursion over one step of SI phi and gamma."""
+        return RiccatiMap.of_step(*self.step(phi, gamma), self.state, self.input)
+
+    def gain(self, phi: Matrix, gamma: Matrix, cost_to_go: Matrix) -> Matrix:
+        """(m, n) SI gain K of u = -K x over a step of SI phi and gamma, for the scaled cost-to-go after
+        it."""
+        scaled_phi, scaled_gamma = self.step(phi, gamma)
+        reach = scaled_gamma.T @ cost_to_go
+        gain: Matrix = np.linalg.solve(self.input + reach @ scaled_gamma, reach @ scaled_phi)
+        return gain * np.outer(self.input_unit, 1.0 / self.state_unit)
+
+
+def stationary_gain(phi: Matrix, gamma: Matrix, weights: Weights) -> Matrix:
+    """Gain K (3, n) of the infinite-horizon discrete LQR u = -K x for x' = phi x + gamma u (Neokleous
+    4.29-4.30).
+
+    Raises:
+        DesignError: no stabilising solution.
+    """
+    gain = weights.gain(phi, gamma, weights.map(phi, gamma).stabilising())
+    if not spectral_radius(phi - gamma @ gain) < 1.0:
+        raise DesignError("the closed loop of these weights is not stable")
+    return gain
+
+
+def continuous_gain(dynamics: Matrix, inputs: Matrix, weights: Weights) -> Matrix:
+    """Gain K (3, n) of the infinite-horizon continuous LQR for dx/dt = A x + B u (Roberts 38-40).
+
+    Raises:
+        DesignError: no stabilising solution.
+    """
+    rate = np.sqrt(weights.input_unit[0])
+    a, b = weights.step(dynamics, inputs)
+    try:
+        p = solve_continuous_are(a / rate, b / rate, weights.state, weights.input)
+    except (LinAlgError, ValueError) as error:
+        raise DesignError(f"the Riccati equation has no stabilising solution ({error})") from error
+    gain: Matrix = np.linalg.solve(weights.input, (b / rate).T @ p)
+    return gain * np.outer(weights.input_unit, 1.0 / weights.state_unit)
+
+
+def finite_gains(phi: Matrix, gamma: Matrix, weights: Weights, terminal_weight: Matrix, steps: int) -> Matrix:
+    """Gains K (steps, 3, n) that minimise the cost over a number of steps plus x' S x after the last
+    (Neokleous 4.21).
+
+    `terminal_weight` is S (n, n), in the units of the Q and R that `weights` was made from.
+    """
+    cost_to_go = terminal_weight * np.outer(weights.state_unit, weights.state_unit) / weights.cost_unit
+    one = weights.map(phi, gamma)
+    gains = np.empty((steps, 3, len(phi)))
+    for step in reversed(range(steps)):
+        gains[step] = weights.gain(phi, gamma, cost_to_go)
+        cost_to_go = one.backward(cost_to_go)
+    return gains
+
+
+def periodic_gains(models: Sequence[tuple[Matrix, Matrix]], repeats: int, weights: Weights) -> Matrix:
+    """Gains K (N, 3, n) of the periodic LQR: the discrete periodic Riccati equation over one orbit.
+
+    Args:
+        models: N pairs phi (n, n), gamma (n, 3) of one tick, equally spaced over the orbit.
+        repeats: ticks for which each of them stands.
+        weights: the cost of every tick.
+
+    Raises:
+        DesignError: no stabilising periodic solution.
+    """
+    stretches = [weights.map(phi, gamma).repeated(repeats) for phi, gamma in models]
+    orbit = reduce(RiccatiMap.then, stretches)
+    cost_to_go = orbit.stabilising()
+    gains = np.empty((len(models), 3, len(weights.state)))
+    for index in reversed(range(len(models))):
+        middle = weights.map(*models[index]).repeated((repeats + 1) // 2).backward(cost_to_go)
+        gains[index] = weights.gain(*models[index], middle)
+        cost_to_go = stretches[index].backward(cost_to_go)
+    turn = np.eye(len(weights.state))
+    for (phi, gamma), gain in zip(models, gains, strict=True):
+        closed = (phi - gamma @ gain) * np.outer(1.0 / weights.state_unit, weights.state_unit)
+        turn = np.linalg.matrix_power(closed, repeats) @ turn
+    if not spectral_radius(turn) < 1.0:
+        raise DesignError("the closed loop of these weights is not stable over an orbit")
+    return gains
+
+
+def spectral_radius(matrix: Matrix) -> float:
+    """Largest magnitude of an eigenvalue."""
+    return float(np.abs(np.linalg.eigvals(matrix)).max())

@@ -1,0 +1,60 @@
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from formation_gnc.control.controller import Vehicle
+from formation_gnc.interface import NANOSECONDS, Estimate, Target, Vector
+from formation_gnc.mission import Mission, Orbit
+
+
+@pytest.fixture
+def mission() -> Mission:
+    """MUSTANG's orbit (Roberts), 10 s ticks."""
+    return Mission(Orbit(6978100.0, inclination=1.4835298641951802), tick=10.0)
+
+
+@pytest.fixture
+def vehicle() -> Vehicle:
+    """Roberts' follower: 100 kg, 10 mN."""
+    return Vehicle(100.0, np.full(3, 0.01))
+
+
+@pytest.fixture
+def estimate() -> Callable[..., Estimate]:
+    """An estimate of a relative state at a time (s)."""
+
+    def build(state: Vector, time: float = 0.0, mass: float = 100.0, chief: Vector | None = None) -> Estimate:
+        return Estimate(
+            time=round(time * NANOSECONDS),
+            relative_state=np.asarray(state, dtype=float),
+            covariance=np.zeros((6, 6)),
+            chief_state=np.zeros(6) if chief is None else chief,
+            mass=mass,
+            eclipse=False,
+            sensor=[],
+            innovation=[],
+            innovation_sigma=[],
+            nis=0.0,
+            status=0,
+        )
+
+    return build
+
+
+@pytest.fixture
+def target() -> Callable[..., Target]:
+    """A target state at a time (s), with or without a preview."""
+
+    def build(
+        state: Vector | None = None, time: float = 0.0, preview: Vector | None = None, step: float = 60.0
+    ) -> Target:
+        return Target(
+            round(time * NANOSECONDS),
+            "leader_follower",
+            np.zeros(6) if state is None else np.asarray(state, dtype=float),
+            step,
+            np.empty((0, 6)) if preview is None else preview,
+        )
+
+    return build
