@@ -43,8 +43,8 @@ class LqrParameters:
         "discrete",
         choices=("discrete", "continuous", "frozen", "periodic", "finite"),
         in_flight=True,
-        doc="discrete or continuous: one gain for ever; frozen: that of the model as it is at each point of the "
-        "orbit (Roberts); periodic: optimal over all orbits; finite: optimal up to final_time, then as discrete",
+        doc="discrete or continuous: one gain for ever; frozen: that of the model as it is at each point of "
+        "the orbit (Roberts); periodic: optimal over all orbits; finite: up to final_time, then as discrete",
     )
     final_time: float = parameter(
         0.0, unit="s", minimum=0.0, in_flight=True, doc="horizon of the finite gain, from where it takes over"

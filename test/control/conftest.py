@@ -8,19 +8,19 @@ from formation_gnc.interface import NANOSECONDS, Estimate, Target, Vector
 from formation_gnc.mission import Mission, Orbit
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def mission() -> Mission:
     """MUSTANG's orbit (Roberts), 10 s ticks."""
     return Mission(Orbit(6978100.0, inclination=1.4835298641951802), tick=10.0)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def vehicle() -> Vehicle:
     """Roberts' follower: 100 kg, 10 mN."""
     return Vehicle(100.0, np.full(3, 0.01))
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def estimate() -> Callable[..., Estimate]:
     """An estimate of a relative state at a time (s)."""
 
@@ -42,7 +42,7 @@ def estimate() -> Callable[..., Estimate]:
     return build
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def target() -> Callable[..., Target]:
     """A target state at a time (s), with or without a preview."""
 
