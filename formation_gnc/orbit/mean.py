@@ -1,0 +1,100 @@
+"""Mean elements: osculating ones freed of the short-period wobble of J2.
+
+Brouwer's first-order theory in the form of a Lie transformation: osculating states are the mean ones moved
+along the flow of a generating function W for unit time. W satisfies ``n dW/dl = H1 - <H1>`` for the J2 part
+H1 of the energy and its mean over the mean anomaly l. Written in position and velocity it has no singular
+case, circular, equatorial or other, and the flow runs backwards exactly, so the transformation inverts to
+rounding. Long-period terms stay in: at the critical inclination nothing is divided by zero.
+
+Derivation: docs/theory/orbits.md.
+"""
+
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from formation_gnc.orbit.constants import EARTH_RADIUS, J2, MU
+from formation_gnc.orbit.elements import Elements, elements_from_state, state_from_elements
+
+Array = NDArray[np.float64]
+
+
+def mean_elements(osculating: Elements) -> Elements:
+    """Mean elements under J2: they drift at `secular_rates`, up to terms of the order of J2 squared.
+
+    Args:
+        osculating: Keplerian elements.
+    """
+    return elements_from_state(mean_state(state_from_elements(osculating)))
+
+
+def osculating_elements(mean: Elements) -> Elements:
+    """Osculating elements: the inverse of `mean_elements`."""
+    return elements_from_state(osculating_state(state_from_elements(mean)))
+
+
+def mean_state(osculating: Array) -> Array:
+    """Inertial state of the mean orbit, (6,), of an osculating inertial state, (6,), m and m/s."""
+    return _flow(osculating, -1.0)
+
+
+def osculating_state(mean: Array) -> Array:
+    """Osculating inertial state, (6,), of the mean orbit's inertial state, (6,), m and m/s."""
+    return _flow(mean, 1.0)
+
+
+def secular_rates(mean: Elements) -> tuple[float, float, float]:
+    """Mean rates of right ascension, argument of perigee and mean anomaly under J2, rad/s.
+
+    Args:
+        mean: mean elements.
+    """
+    n, cos_i = mean.mean_motion, np.cos(mean.inclination)
+    eta = sqrt(1.0 - mean.eccentricity**2)
+    strength = 0.75 * n * J2 * (EARTH_RADIUS / (mean.semi_major_axis * eta**2)) ** 2
+    return (
+        float(-2.0 * strength * cos_i),
+        float(strength * (5.0 * cos_i**2 - 1.0)),
+        float(n + strength * eta * (3.0 * cos_i**2 - 1.0)),
+    )
+
+
+def _generating_function(states: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """W of states (6, K), m^2/s; analytic, so that complex steps differentiate it exactly."""
+    rx, ry, rz, vx, vy, vz = states
+    r = np.sqrt(rx * rx + ry * ry + rz * rz)
+    h = np.sqrt((ry * vz - rz * vy) ** 2 + (rz * vx - rx * vz) ** 2 + (rx * vy - ry * vx) ** 2)
+    radial = (rx * vx + ry * vy + rz * vz) / r
+    a = 1.0 / (2.0 / r - (vx * vx + vy * vy + vz * vz) / MU)
+    root = np.sqrt(MU * a)
+    e_sin_f, e_cos_f = h * radial / MU, h * h / (MU * r) - 1.0
+    e_sin_anomaly, e_cos_anomaly = r * radial / root, 1.0 - r / a
+    centre = 2.0 * np.arctan(e_sin_anomaly / (1.0 + h / root - e_cos_anomaly)) + e_sin_anomaly  # f - l
+    up, ahead = rz / r, (vz - radial * rz / r) * r / h  # sin i sin u and sin i cos u
+    double_sine, double_cosine = 2.0 * up * ahead, ahead * ahead - up * up  # sin^2 i times sin 2u and cos 2u
+    w: NDArray[np.complex128] = (0.5 * MU**2 * J2 * EARTH_RADIUS**2 / h**3) * (
+        (1.5 * (up * up + ahead * ahead) - 1.0) * (centre + e_sin_f)
+        - double_sine * (0.75 + e_cos_f)
+        + 0.5 * double_cosine * e_sin_f
+    )
+    return w
+
+
+def _velocity(state: Array) -> Array:
+    """Speed of the flow of W: its Hamiltonian vector field, per unit of the flow's parameter."""
+    steps = 1e-30 * np.array([1e7, 1e7, 1e7, 1e4, 1e4, 1e4])
+    slopes = _generating_function(state[:, None] + 1j * np.diag(steps)).imag / steps
+    return np.concatenate((slopes[3:], -slopes[:3]))
+
+
+def _flow(state: Array, duration: float) -> Array:
+    """Runge-Kutta's classical method in two steps: each error is of the fifth order in J2."""
+    now, step = np.array(state, dtype=np.float64), 0.5 * duration
+    for _ in range(2):
+        first = _velocity(now)
+        second = _velocity(now + 0.5 * step * first)
+        third = _velocity(now + 0.5 * step * second)
+        fourth = _velocity(now + step * third)
+        now = now + step / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
+    return now
