@@ -47,7 +47,7 @@ class PlantNode(ConfiguredNode):
         }
         self._truth = self._publisher(Truth, topics.TRUTH)
         self._events = self._publisher(Event, topics.EVENTS)
-        self._clock = self.create_publisher(Clock, topics.CLOCK, topics.quality())
+        self._tell_time = self.create_publisher(Clock, topics.CLOCK, topics.quality())
         self._diagnostics = self.create_publisher(DiagnosticArray, topics.DIAGNOSTICS, topics.quality())
         for name in self.values.deputies:
             self.create_subscription(
@@ -135,7 +135,7 @@ class PlantNode(ConfiguredNode):
         self._truth.publish(to_message(truth))
         clock = Clock()
         clock.clock.sec, clock.clock.nanosec = divmod(truth.time, NANOSECONDS)
-        self._clock.publish(clock)
+        self._tell_time.publish(clock)
 
     def _tell_event(self, time: int, tick: int, kind: str, detail: str) -> None:
         self._events.publish(to_message(Event(time, tick, self.get_fully_qualified_name(), kind, detail)))

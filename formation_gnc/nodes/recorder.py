@@ -1,5 +1,6 @@
 """The recorder node: every topic, byte for byte, into an MCAP bag."""
 
+import json
 import signal
 import struct
 from collections.abc import Callable
@@ -10,7 +11,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-import yaml
+
 from rcl_interfaces.msg import ParameterType
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
@@ -61,11 +62,12 @@ class RecorderNode(ConfiguredNode):
         self._progress = self.create_publisher(Clock, topics.RECORDED, topics.quality(topics.LATEST))
         self._topics: set[str] = set()
         self._counts: dict[str, int] = {}
-        self._asked: set[str] = set()
-        self._parameters: dict[str, dict[str, Any]] = {}
-        self._time = self._reported = -1
+        self._askable: dict[str, AsyncParameterClient] = {}
+        self._settings: dict[str, dict[str, Any]] = {}
+        self._time = 0
+        self._heard: dict[str, int] = {}
+        self._reported = -1
         self._last_message = monotonic()
-        self._since_report = 0
         self.create_timer(LOOK_PERIOD, self._look)
         self.create_timer(FLUSH_PERIOD, self.bag.flush)
 
@@ -75,8 +77,8 @@ class RecorderNode(ConfiguredNode):
 
     def close(self) -> None:
         """Write what is known only at the end, and finish the bag."""
-        for node, values in sorted(self._parameters.items()):
-            self.bag.add_metadata(f"parameters {node}", {name: yaml.safe_dump(value).strip() for name, value in values.items()})
+        for node, values in sorted(self._settings.items()):
+            self.bag.add_metadata(f"parameters {node}", {name: json.dumps(value) for name, value in values.items()})
         self.bag.close()
 
     def _look(self) -> None:
@@ -84,10 +86,15 @@ class RecorderNode(ConfiguredNode):
             if topic not in self._topics:
                 self._topics.add(topic)
                 self._record(topic, type_name)
-        for name, namespace in self.get_node_names_and_namespaces():
-            self._ask_parameters(f"{namespace.rstrip('/')}/{name}")
-        if self._time != self._reported:
-            self._report()
+        for service, _ in self.get_service_names_and_types():
+            node, _, kind = service.rpartition("/")
+            if kind == "get_parameters" and node not in self._askable:
+                self._askable[node] = AsyncParameterClient(self, node)
+        for node, client in self._askable.items():
+            if node not in self._settings and client.services_are_ready():
+                self._settings[node] = {}
+                self._ask_parameters(node, client)
+        self._report()
 
     def _record(self, topic: str, type_name: str) -> None:
         try:
@@ -107,41 +114,40 @@ class RecorderNode(ConfiguredNode):
     def _receiver(self, topic: str, message_type: Any) -> Callable[[bytes], None]:
         stamped = "std_msgs/Header" in list(message_type.get_fields_and_field_types().values())[:1]
         is_clock = topic == topics.CLOCK
+        paced = is_clock or topic == topics.TRUTH or topic.endswith(f"/{topics.MEASUREMENT}")
 
         def receive(data: bytes) -> None:
             self._last_message = monotonic()
-            if is_clock:
-                self._time = _first_stamp(data)
+            stamp = _first_stamp(data) if stamped or is_clock else self._time
             self._counts[topic] += 1
-            self.bag.write(topic, data, _first_stamp(data) if stamped else max(self._time, 0), self._counts[topic])
+            self.bag.write(topic, data, stamp, self._counts[topic])
+            if paced:
+                self._heard[topic] = stamp
             if is_clock:
-                self._since_report += 1
-                if self._since_report >= REPORT_TICKS:
+                self._time = stamp
+                if self._counts[topic] % REPORT_TICKS == 0:
                     self._report()
 
         return receive
 
     def _report(self) -> None:
-        self._reported, self._since_report = self._time, 0
-        progress = Clock()
-        progress.clock.sec, progress.clock.nanosec = divmod(self._time, NANOSECONDS)
-        self._progress.publish(progress)
+        """Tell the plant up to which tick all that it publishes at every tick is recorded."""
+        recorded = min(self._heard.values(), default=-1)
+        if recorded != self._reported:
+            self._reported = recorded
+            progress = Clock()
+            progress.clock.sec, progress.clock.nanosec = divmod(recorded, NANOSECONDS)
+            self._progress.publish(progress)
 
-    def _ask_parameters(self, node: str) -> None:
-        """Ask a node once for all its parameters, for the record."""
-        if node in self._asked or node == self.get_fully_qualified_name():
-            return
-        client = AsyncParameterClient(self, node)
-        if not client.services_are_ready():
-            return
-        self._asked.add(node)
+    def _ask_parameters(self, node: str, client: AsyncParameterClient) -> None:
+        """Ask a node for all its parameters, for the record."""
 
         def on_list(answer: Future) -> None:
             names = list(answer.result().result.names)
             client.get_parameters(names, callback=lambda values: on_values(names, values))
 
         def on_values(names: list[str], answer: Future) -> None:
-            self._parameters[node] = {
+            self._settings[node] = {
                 name: parameter_value_to_python(value)
                 for name, value in zip(names, answer.result().values, strict=True)
                 if value.type != ParameterType.PARAMETER_NOT_SET

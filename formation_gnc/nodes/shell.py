@@ -4,12 +4,13 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from time import perf_counter
+from time import monotonic, perf_counter
 from typing import Any
 
 import rclpy
 from formation_gnc_msgs.msg import Timing
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.duration import Duration
 from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, RMWError, UnknownROSArgsError
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -34,6 +35,9 @@ from formation_gnc.part import Part
 REFUSED_BY_ROS = (RCLInvalidROSArgsError, UnknownROSArgsError, RCLError, RMWError)
 """What rclpy raises for arguments, parameter files and middleware it cannot use."""
 
+FAREWELL = 1.0
+"""Wall time (s) that a node waits at its end for its last messages to arrive."""
+
 OWN_OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides")
 """Parameters that every ROS node has, or may be given, besides its schema."""
 
@@ -47,7 +51,10 @@ class ConfiguredNode(Node):  # type: ignore[misc]
 
     def __init__(self, name: str, schema: type, namespace: str = "") -> None:
         """Declare the schema's parameters with the values given on the command line and in parameter files."""
-        super().__init__(name, namespace=namespace, automatically_declare_parameters_from_overrides=True)
+        try:
+            super().__init__(name, namespace=namespace, automatically_declare_parameters_from_overrides=True)
+        except ValueError as error:  # an empty list has no type for ROS
+            raise ConfigurationError(f"a parameter is an empty list; leave it out ({error})") from None
         given = {
             parameter.name: parameter.value
             for parameter in self.get_parameters_by_prefix("").values()
@@ -61,6 +68,13 @@ class ConfiguredNode(Node):  # type: ignore[misc]
             if leaf.name in given:
                 self.undeclare_parameter(leaf.name)
             self.declare_parameter(leaf.name, plain, _descriptor(leaf), ignore_override=True)
+
+    def destroy_node(self) -> None:
+        """Leave only when everybody has what was published."""
+        deadline = monotonic() + FAREWELL
+        for publisher in self.publishers:
+            publisher.wait_for_all_acked(Duration(seconds=max(0.0, deadline - monotonic())))
+        super().destroy_node()
 
 
 def _descriptor(leaf: Leaf) -> ParameterDescriptor:

@@ -1,0 +1,134 @@
+"""Figures of a recorded run."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.interface import Matrix, Vector
+from formation_gnc.recording.reader import Bag
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """What a bag says of one deputy, tick by tick, over the ticks on which every part answered."""
+
+    time: Vector
+    """(N,) simulated time, s."""
+    truth: Matrix
+    """(N, 6) true relative states, Hill frame, m and m/s."""
+    estimate: Matrix
+    """(N, 6) estimated ones."""
+    sigma: Matrix
+    """(N, 6) standard deviations of the estimate by the filter's own covariance."""
+    target: Matrix
+    """(N, 6) target states."""
+    nis: Vector
+    """(N,) normalised innovation squared; 0 on ticks without readings."""
+    applied: Matrix
+    """(M, 3) accelerations the thrusters gave over each tick, Hill frame, m/s^2; on all ticks of the truth."""
+    applied_time: Vector
+    """(M,) time at which each of those ticks began, s."""
+    tick: float
+    """Length of a tick, s."""
+
+    @property
+    def error(self) -> Matrix:
+        """(N, 3) true position minus target, m."""
+        return self.truth[:, :3] - self.target[:, :3]
+
+    @property
+    def estimation_error(self) -> Matrix:
+        """(N, 6) estimate minus truth."""
+        return self.estimate - self.truth
+
+    @property
+    def delta_v(self) -> Vector:
+        """(3,) delta-v per Hill axis, m/s."""
+        return np.asarray(np.abs(self.applied).sum(axis=0) * self.tick)
+
+
+@dataclass(frozen=True)
+class DeputyFigures:
+    """How well one deputy flew; `formation-gnc sil --json` prints these names."""
+
+    final_error_m: float
+    rms_error_m: float
+    estimate_rms_m: float
+    mean_nis: float
+    delta_v_m_s: float
+    delta_v_axes_m_s: list[float]
+
+
+@dataclass(frozen=True)
+class RunFigures:
+    """Figures of a whole run."""
+
+    ticks: int
+    misses: int
+    deputies: dict[str, DeputyFigures]
+
+
+def deputies_of(bag: Bag) -> list[str]:
+    """Names of the deputies in a bag, in its own order of truth."""
+    if "/truth" not in bag.topics or bag.topics["/truth"].count == 0:
+        raise ConfigurationError(f"{bag.path}: has no truth to measure a run by")
+    truth = bag.arrays("/truth")
+    count = sum(key.endswith(".name") for key in truth)
+    return [str(truth[f"deputies.{index}.name"][0]) for index in range(count)]
+
+
+def trajectory(bag: Bag, deputy: str) -> Trajectory:
+    """The trajectory of one deputy.
+
+    Raises:
+        ConfigurationError: no truth, or no ticks on which this deputy has an estimate and a target.
+    """
+    truth = bag.arrays("/truth")
+    index = deputies_of(bag).index(deputy)
+    missing = [topic for topic in ("estimate", "target") if f"/{deputy}/{topic}" not in bag.topics]
+    if missing:
+        raise ConfigurationError(f"{bag.path}: has no {' and no '.join(missing)} of {deputy}")
+    estimate, target = bag.arrays(f"/{deputy}/estimate"), bag.arrays(f"/{deputy}/target")
+    stamps = np.intersect1d(
+        np.intersect1d(truth["stamp_ns"], estimate["stamp_ns"]), target["stamp_ns"]
+    )
+    if not len(stamps):
+        raise ConfigurationError(f"{bag.path}: {deputy} never answered")
+    rows = {id(part): np.searchsorted(part["stamp_ns"], stamps) for part in (truth, estimate, target)}
+    prefix = f"deputies.{index}."
+    time = truth["time"]
+    tick = float(time[1] - time[0]) if len(time) > 1 else 0.0
+    covariance = estimate["covariance"][rows[id(estimate)]].reshape(-1, 6, 6)
+    return Trajectory(
+        time=stamps * 1e-9,
+        truth=truth[f"{prefix}relative_state"][rows[id(truth)]],
+        estimate=estimate["relative_state"][rows[id(estimate)]],
+        sigma=np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)),
+        target=target["relative_state"][rows[id(target)]],
+        nis=estimate["nis"][rows[id(estimate)]],
+        # truth at a tick holds the force of the tick before
+        applied=(truth[f"{prefix}applied_force"] / truth[f"{prefix}mass"][:, None])[1:],
+        applied_time=time[:-1],
+        tick=tick,
+    )
+
+
+def figures(bag: Bag) -> RunFigures:
+    """The figures of a run."""
+    deputies = {}
+    for name in deputies_of(bag):
+        flown = trajectory(bag, name)
+        error = np.linalg.norm(flown.error, axis=1)
+        estimation = np.linalg.norm(flown.estimation_error[:, :3], axis=1)
+        measured = flown.nis[flown.nis > 0.0]
+        deputies[name] = DeputyFigures(
+            final_error_m=float(error[-1]),
+            rms_error_m=float(np.sqrt(np.mean(error**2))),
+            estimate_rms_m=float(np.sqrt(np.mean(estimation**2))),
+            mean_nis=float(measured.mean()) if len(measured) else 0.0,
+            delta_v_m_s=float(flown.delta_v.sum()),
+            delta_v_axes_m_s=flown.delta_v.tolist(),
+        )
+    kinds = bag.arrays("/events")["kind"] if "/events" in bag.topics else np.array([])
+    return RunFigures(bag.topics["/truth"].count, int(np.count_nonzero(kinds == "miss")), deputies)

@@ -1,0 +1,43 @@
+"""The `formation-gnc` command."""
+
+import argparse
+import signal
+import sys
+from collections.abc import Sequence
+
+
+from formation_gnc import __version__
+from formation_gnc.commands import COMMANDS
+from formation_gnc.errors import ConfigurationError
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a subcommand.
+
+    Returns:
+        0 when it did what it was asked, 1 when a run failed, 2 when what it was given is not allowed, 130 when interrupted.
+    """
+    parser = argparse.ArgumentParser(
+        prog="formation-gnc",
+        description="Fly satellites in formation in software-in-the-loop, and look at what they did.",
+        epilog="`formation-gnc COMMAND --help` says more of each command.",
+    )
+    parser.add_argument("--version", action="version", version=f"formation-gnc {__version__}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for name, command in COMMANDS.items():
+        doc = (command.__doc__ or "").strip()
+        subparser = commands.add_parser(
+            name, help=doc.splitlines()[0].rstrip("."), description=doc, formatter_class=argparse.RawDescriptionHelpFormatter
+        )
+        command.add_arguments(subparser)
+        subparser.set_defaults(run=command.run)
+    options = parser.parse_args(arguments)
+    # A polite kill ends a run as Ctrl-C does: everything stops, the bag is closed.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        return int(options.run(options))
+    except ConfigurationError as error:
+        print(f"formation-gnc: {error}", file=sys.stderr)
+        return 2
+    except BrokenPipeError:
+        return 1

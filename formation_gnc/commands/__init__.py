@@ -1,0 +1,5 @@
+"""Subcommands of `formation-gnc`, one module each: a docstring for its help, `add_arguments` and `run`."""
+
+from formation_gnc.commands import sil
+
+COMMANDS = {"sil": sil}

@@ -1,0 +1,197 @@
+"""Fly a scenario in software-in-the-loop, record it and print how well it flew.
+
+The node graph runs as real processes over DDS in a ROS domain of its own; with --in-process the same
+objects run in this process, to the same bits and faster.
+"""
+
+import argparse
+import dataclasses
+import json
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from formation_gnc.control.registry import ALGORITHMS
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.sil.scenario import Scenario, duration_of, load_scenario
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the command."""
+    parser.add_argument("scenario", help="name of a scenario in params/, or a ROS 2 parameter file")
+    parser.add_argument("--controller", metavar="NAME", help=f"control law of every deputy: {', '.join(ALGORITHMS)}")
+    length = parser.add_mutually_exclusive_group()
+    length.add_argument("--duration", metavar="S", type=float, help="simulated seconds to fly")
+    length.add_argument("--orbits", metavar="N", type=float, help="orbits of the chief to fly")
+    parser.add_argument("--seed", metavar="N", type=int, help="seed of every random number of the run")
+    parser.add_argument(
+        "--real-time-factor", metavar="X", type=float, help="simulated seconds per wall second at most; 0: no limit"
+    )
+    parser.add_argument("--in-process", action="store_true", help="fly in this process, without the node graph")
+    parser.add_argument("--bag", metavar="DIR", type=Path, help="directory to make for the bag (default: bags/SCENARIO_DATE)")
+    parser.add_argument("--json", action="store_true", help="print the figures as one JSON object")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Fly, record, summarise."""
+    scenario = _scenario(options)
+    bag = options.bag or _free_directory(scenario.name)
+    if bag.exists():
+        raise ConfigurationError(f"bag {bag}: exists already; name a directory that does not")
+    console = Console(stderr=True, highlight=False)
+    fly = _fly_in_process if options.in_process else _fly_on_graph
+    try:
+        speedup = fly(scenario, bag, console)
+    except KeyboardInterrupt:
+        print(f"formation-gnc: interrupted; {_closed(bag)}", file=sys.stderr)
+        return 130
+    except RuntimeError as failure:
+        print(f"formation-gnc: {failure}; {_closed(bag)}", file=sys.stderr)
+        return 1
+    return _summarise(scenario, bag, speedup, options.json)
+
+
+def _scenario(options: argparse.Namespace) -> Scenario:
+    given = {"seed": options.seed, "duration": options.duration, "real_time_factor": options.real_time_factor}
+    plant = {name: value for name, value in given.items() if value is not None}
+    controller = {"algorithm": options.controller} if options.controller else {}
+    overrides: dict[str, dict[str, Any]] = {"/plant": plant, "/**/controller": controller}
+    scenario = load_scenario(options.scenario, overrides)
+    if options.orbits is not None:
+        overrides["/plant"]["duration"] = duration_of(options.orbits, scenario)
+        scenario = load_scenario(options.scenario, overrides)
+    return scenario
+
+
+def _free_directory(name: str) -> Path:
+    first = Path("bags") / f"{name}_{datetime.now(UTC):%Y-%m-%d_%H-%M-%S}"
+    directory, number = first, 1
+    while directory.exists():
+        number += 1
+        directory = first.with_name(f"{first.name}-{number}")
+    return directory
+
+
+def _closed(bag: Path) -> str:
+    return f"bag closed: {bag}" if (bag / "metadata.yaml").exists() else "nothing was recorded"
+
+
+class _Display:
+    """A progress bar on a terminal; elsewhere a line whenever the state of the run changes."""
+
+    def __init__(self, console: Console, ticks: int) -> None:
+        self._console = console
+        self._said = ""
+        self._bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("ticks, {task.fields[speedup]:,.0f} x real time"),
+            TimeRemainingColumn(),
+            console=console,
+            transient=True,
+            disable=not console.is_terminal,
+        )
+        self._task = self._bar.add_task("starting", total=ticks, speedup=0.0)
+
+    def __enter__(self) -> "_Display":
+        self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+
+    def say(self, text: str) -> None:
+        if text != self._said:
+            self._console.print(text)
+            self._said = text
+
+    def show(self, message: str, tick: float, speedup: float) -> None:
+        self._bar.update(self._task, description=message, completed=tick, speedup=speedup)
+        if message.startswith("waiting"):
+            self.say(message)
+
+
+def _fly_on_graph(scenario: Scenario, bag: Path, console: Console) -> float:
+    from formation_gnc.nodes.launcher import Report, fly_graph
+
+    def show(report: Report) -> None:
+        display.show(report.message, report.figures.get("tick", 0.0), report.figures.get("speedup", 0.0))
+
+    with _Display(console, scenario.plant.ticks) as display:
+        return fly_graph(scenario, bag.absolute(), show, display.say).figures.get("speedup", 0.0)
+
+
+def _fly_in_process(scenario: Scenario, bag: Path, console: Console) -> float:
+    from formation_gnc.nodes.record_in_process import InProcessRecorder
+    from formation_gnc.recording.provenance import provenance
+    from formation_gnc.recording.writer import BagWriter
+    from formation_gnc.sil.runner import Run
+
+    run = Run(scenario)
+    tick, pace = scenario.plant.tick, scenario.plant.real_time_factor
+    if pace:
+        raise ConfigurationError("real_time_factor: has no effect in-process; fly the node graph for a paced run")
+    parameters = {
+        f"parameters {node}": {name: json.dumps(value) for name, value in values.items()}
+        for node, values in scenario.parameters().items()
+    }
+    with BagWriter(bag, provenance() | parameters) as writer, _Display(console, scenario.plant.ticks) as display:
+        sink = InProcessRecorder(writer)
+        started = perf_counter()
+        while not run.plant.finished:
+            run.tick(sink)
+            if run.plant.tick % 500 == 0:
+                display.show("flying", run.plant.tick, run.plant.tick * tick / (perf_counter() - started))
+        run.finish(sink)
+        return run.plant.tick * tick / (perf_counter() - started)
+
+
+def _summarise(scenario: Scenario, bag: Path, speedup: float, as_json: bool) -> int:
+    from formation_gnc.analysis.metrics import figures
+    from formation_gnc.analysis.overview import draw_overview
+    from formation_gnc.recording.reader import Bag
+
+    recorded = Bag(bag)
+    result = figures(recorded)
+    picture = draw_overview(recorded, bag / "overview.png", scenario.name)
+    if as_json:
+        summary = {
+            "scenario": scenario.name,
+            "seed": scenario.plant.seed,
+            "ticks": result.ticks,
+            "misses": result.misses,
+            "speedup": speedup,
+            "bag": str(bag),
+            "picture": str(picture),
+            "deputies": {name: dataclasses.asdict(each) for name, each in result.deputies.items()},
+        }
+        print(json.dumps(summary, indent=2))
+        return 0
+    table = Table(title=f"{scenario.name}, seed {scenario.plant.seed}", title_justify="left")
+    table.add_column("figure")
+    for name in result.deputies:
+        table.add_column(name, justify="right")
+    deputies = list(result.deputies.values())
+    rows = {
+        "final position error [m]": [f"{each.final_error_m:.3f}" for each in deputies],
+        "RMS position error [m]": [f"{each.rms_error_m:.3f}" for each in deputies],
+        "RMS estimation error [m]": [f"{each.estimate_rms_m:.3f}" for each in deputies],
+        "mean NIS [-]": [f"{each.mean_nis:.3f}" for each in deputies],
+        "delta-v x, y, z [mm/s]": [", ".join(f"{1e3 * axis:.2f}" for axis in each.delta_v_axes_m_s) for each in deputies],
+        "delta-v total [mm/s]": [f"{1e3 * each.delta_v_m_s:.2f}" for each in deputies],
+    }
+    for label, values in rows.items():
+        table.add_row(escape(label), *values)
+    console = Console(highlight=False)
+    console.print(table)
+    console.print(f"{result.ticks} ticks, {result.misses} missed, {speedup:,.0f} x real time")
+    console.print(f"bag: {bag}\npicture: {picture}", soft_wrap=True)
+    return 0

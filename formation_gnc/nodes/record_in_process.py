@@ -1,0 +1,37 @@
+"""Records an in-process run as the recorder node would record the node graph."""
+
+from typing import Any
+
+from rclpy.serialization import serialize_message
+from rosgraph_msgs.msg import Clock
+
+from formation_gnc import interface
+from formation_gnc.interface import NANOSECONDS
+from formation_gnc.nodes import topics
+from formation_gnc.nodes.conversion import message_type, to_message
+from formation_gnc.recording.writer import BagWriter
+
+
+class InProcessRecorder:
+    """A sink for :class:`formation_gnc.sil.runner.Run` that writes every record to a bag."""
+
+    def __init__(self, bag: BagWriter) -> None:
+        """Write to a bag, which is closed by the one who made it."""
+        self._bag = bag
+        self._counts: dict[str, int] = {}
+
+    def __call__(self, topic: str, record: Any) -> None:
+        """Write one record; the clock follows each truth, as the plant publishes it."""
+        self._write(topic, to_message(record), message_type(type(record)), record.time)
+        if isinstance(record, interface.Truth):
+            clock = Clock()
+            clock.clock.sec, clock.clock.nanosec = divmod(record.time, NANOSECONDS)
+            self._write(topics.CLOCK, clock, Clock, record.time)
+
+    def _write(self, topic: str, message: Any, kind: Any, time: int) -> None:
+        count = self._counts.get(topic, 0)
+        if count == 0:
+            package = kind.__module__.split(".")[0]
+            self._bag.add_topic(topic, f"{package}/msg/{kind.__name__}", topics.DEPTH)
+        self._counts[topic] = count + 1
+        self._bag.write(topic, serialize_message(message), time, count + 1)

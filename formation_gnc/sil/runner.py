@@ -1,0 +1,76 @@
+"""The in-process runner: the objects of the node graph, called one after the other."""
+
+from collections.abc import Callable
+from typing import Any
+
+from formation_gnc.control.autopilot import Autopilot
+from formation_gnc.guidance.guide import Guide
+from formation_gnc.interface import Event, Thrust, Vector
+from formation_gnc.navigation.navigator import Navigator
+from formation_gnc.part import Part
+from formation_gnc.plant.plant import Plant
+from formation_gnc.sil.scenario import Scenario
+
+Sink = Callable[[str, Any], None]
+"""Takes a topic and the record that the node graph would publish on it."""
+
+
+class Satellite:
+    """Navigation, guidance and control of one deputy."""
+
+    def __init__(self, name: str, scenario: Scenario) -> None:
+        """Build the three parts from the scenario."""
+        setup = scenario.deputies[name]
+        self.name = name
+        self.navigator = Navigator(f"/{name}/navigation", setup.navigation)
+        self.guide = Guide(f"/{name}/guidance", setup.guidance)
+        self.autopilot = Autopilot(f"/{name}/controller", setup.controller)
+        self.parts: tuple[Part[Any, Any], ...] = (self.navigator, self.guide, self.autopilot)
+
+    def on_tick(self, measurement: Any, sink: Sink) -> Thrust | None:
+        """From measurement to thrust; none when there is no estimate to act on."""
+        estimate = self.navigator.on_tick(measurement)
+        if estimate is None:
+            return None
+        target = self.guide.on_tick(estimate)
+        thrust, status = self.autopilot.on_tick(estimate, target)
+        for topic, record in (("estimate", estimate), ("target", target), ("thrust", thrust), ("status", status)):
+            sink(f"/{self.name}/{topic}", record)
+        for part in self.parts:
+            for event in part.take_events():
+                sink("/events", event)
+        return thrust
+
+
+class Run:
+    """A whole run without a node graph: the same records on the same topics, bit for bit."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        """Build plant and satellites; raises ConfigurationError for what cannot be flown."""
+        self.plant = Plant(scenario.plant)
+        self.satellites = [Satellite(name, scenario) for name in scenario.plant.deputies]
+        self.misses = 0
+
+    def tick(self, sink: Sink) -> None:
+        """Fly one tick and hand every record to `sink`."""
+        truth, measurements = self.plant.observe()
+        sink("/truth", truth)
+        forces: dict[str, Vector] = {}
+        for satellite in self.satellites:
+            measurement = measurements[satellite.name]
+            sink(f"/{satellite.name}/measurement", measurement)
+            thrust = satellite.on_tick(measurement, sink)
+            if thrust is not None:
+                forces[satellite.name] = thrust.force
+        self.misses += len(self.plant.step(forces))
+
+    def fly(self, sink: Sink) -> None:
+        """Fly to the end."""
+        while not self.plant.finished:
+            self.tick(sink)
+        self.finish(sink)
+
+    def finish(self, sink: Sink) -> None:
+        """Say that all ticks are flown."""
+        detail = f"{self.plant.tick} ticks flown, {self.misses} missed"
+        sink("/events", Event(self.plant.time, self.plant.tick, "/plant", "end", detail))

@@ -1,0 +1,169 @@
+"""One scenario file per run: a standard ROS 2 parameter file, read as every node would read it."""
+
+import math
+import os
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+import formation_gnc
+from formation_gnc.control.autopilot import ControllerParameters
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.guidance.guide import GuidanceParameters
+from formation_gnc.navigation.navigator import NavigationParameters
+from formation_gnc.parameters import dump, load
+from formation_gnc.plant.plant import PlantParameters
+
+SECTION = "ros__parameters"
+
+
+@dataclass(frozen=True)
+class DeputySetup:
+    """Checked parameters of one deputy's parts."""
+
+    navigation: NavigationParameters
+    guidance: Any
+    controller: Any
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A run, ready to fly: every parameter of every node, checked."""
+
+    name: str
+    plant: PlantParameters
+    deputies: Mapping[str, DeputySetup]
+
+    def parameters(self) -> dict[str, dict[str, Any]]:
+        """All parameters by full node name, then by dotted name."""
+        nodes: dict[str, Any] = {"/plant": self.plant}
+        for name, setup in self.deputies.items():
+            nodes |= {f"/{name}/{part}": value for part, value in vars(setup).items()}
+        return {node: dump(values) for node, values in nodes.items()}
+
+    def write(self, path: Path, extra: Mapping[str, Mapping[str, Any]]) -> None:
+        """Write the scenario as a ROS 2 parameter file with nothing left to defaults, and `extra` on top of it."""
+        nodes = self.parameters()
+        for node, values in extra.items():
+            nodes[node] = nodes.get(node, {}) | dict(values)
+        document = {
+            # rclpy takes an empty list for a parameter without a type: left out, it is the default
+            node: {SECTION: {name: _plain(value) for name, value in values.items() if value != ()}}
+            for node, values in nodes.items()
+        }
+        path.write_text(yaml.safe_dump(document, sort_keys=False))
+
+
+def _plain(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value
+
+
+def load_scenario(name: str, overrides: Mapping[str, Mapping[str, Any]] | None = None) -> Scenario:
+    """Read and check a scenario.
+
+    Args:
+        name: of a scenario in `params/`, or the path of a parameter file.
+        overrides: parameters that go before the file's, by node pattern such as ``/**/controller``.
+
+    Raises:
+        ConfigurationError: no such scenario, an unreadable file, or a parameter that is not allowed.
+    """
+    path = find_scenario(name)
+    sections = [*_sections(path), *(overrides or {}).items()]
+    try:
+        plant = _load(PlantParameters, sections, "/plant")
+        deputies = {
+            deputy: DeputySetup(
+                _load(NavigationParameters, sections, f"/{deputy}/navigation"),
+                _load(GuidanceParameters, sections, f"/{deputy}/guidance"),
+                _load(ControllerParameters, sections, f"/{deputy}/controller"),
+            )
+            for deputy in plant.deputies
+        }
+    except ConfigurationError as error:
+        raise ConfigurationError(f"{path.name}: {error}") from None
+    return Scenario(path.stem, plant, deputies)
+
+
+def find_scenario(name: str) -> Path:
+    """Path of a scenario's file, given its name or its path."""
+    if name.endswith((".yaml", ".yml")) or "/" in name:
+        path = Path(name)
+        if not path.is_file():
+            raise ConfigurationError(f"scenario {name}: no such file")
+        return path
+    directories = [directory for directory in _directories() if directory.is_dir()]
+    for directory in directories:
+        if (directory / f"{name}.yaml").is_file():
+            return directory / f"{name}.yaml"
+    known = sorted(path.stem for directory in directories for path in directory.glob("*.yaml"))
+    raise ConfigurationError(f"scenario {name}: unknown; it must be a parameter file or one of {', '.join(known)}")
+
+
+def _directories() -> Iterator[Path]:
+    source = Path(formation_gnc.__file__).resolve().parents[1]
+    if (source / "package.xml").is_file():
+        yield source / "params"
+        return
+    for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep):
+        yield Path(prefix) / "share" / "formation_gnc" / "params"
+
+
+def _load(schema: Any, sections: list[tuple[str, Mapping[str, Any]]], node: str) -> Any:
+    values: dict[str, Any] = {}
+    for pattern, section in sections:
+        if _matches(pattern, node):
+            values |= section
+    try:
+        return load(schema, values)
+    except ConfigurationError as error:
+        raise ConfigurationError(f"{node}: {error}") from None
+
+
+def _matches(pattern: str, node: str) -> bool:
+    """Whether a parameter file's node name, with ``*`` for one token and ``**`` for any, means this node."""
+    expression = "".join(
+        {"**": "(/[^/]+)*", "*": "/[^/]+"}.get(token, "/" + re.escape(token)) for token in pattern.strip("/").split("/")
+    )
+    return re.fullmatch(expression, node) is not None
+
+
+def _sections(path: Path) -> list[tuple[str, dict[str, Any]]]:
+    """Node patterns of a parameter file with their parameters by dotted name, in the file's order."""
+    try:
+        document = yaml.safe_load(path.read_text())
+    except OSError as error:
+        raise ConfigurationError(f"{path}: cannot be read ({error.strerror})") from None
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ConfigurationError(f"{path}: not YAML ({' '.join(str(error).split())})") from None
+    if not isinstance(document, dict):
+        raise ConfigurationError(f"{path}: not a ROS 2 parameter file; it must map node names to {SECTION}")
+    return list(_walk(path, document, ""))
+
+
+def _walk(path: Path, tree: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    for key, value in tree.items():
+        if not isinstance(value, dict):
+            raise ConfigurationError(f"{path}: {prefix}{key} is not a section; it must map to {SECTION}")
+        if key == SECTION:
+            yield prefix.rstrip("/") or "/", dict(_flatten(value))
+        else:
+            yield from _walk(path, value, f"{prefix}{str(key).strip('/')}/" if prefix else f"/{str(key).strip('/')}/")
+
+
+def _flatten(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in tree.items():
+        if isinstance(value, dict):
+            yield from _flatten(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def duration_of(orbits: float, scenario: Scenario) -> float:
+    """Duration (s) of a number of the chief's two-body orbits, in whole ticks."""
+    tick = scenario.plant.tick
+    return math.ceil(orbits * 2.0 * math.pi / scenario.plant.mean_motion / tick - 1e-9) * tick
