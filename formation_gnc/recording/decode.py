@@ -157,6 +157,16 @@ class MessageType:
         return ConfigurationError(f"message type {self.name!r}: a message does not fit it: {reason}")
 
 
+def installed_type(name: str) -> MessageType:
+    """Message type as the installed message packages define it.
+
+    Raises ConfigurationError when it is not installed.
+    """
+    from formation_gnc.recording.schema import schema_text  # here alone, so that reading a bag needs no ROS
+
+    return MessageType(name, schema_text(name).encode(), "ros2msg")
+
+
 @dataclass(frozen=True)
 class _Layout:
     """Where the fields of a message lie, for all messages with the same element counts in them."""

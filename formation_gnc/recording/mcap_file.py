@@ -21,7 +21,16 @@ from mcap.summary import Summary
 from formation_gnc.errors import ConfigurationError
 
 MAGIC = b"\x89MCAP0\r\n"
-UNREADABLE = (McapError, struct.error, ValueError, EOFError, MemoryError, RuntimeError, zstandard.ZstdError)
+UNREADABLE = (
+    McapError,
+    struct.error,
+    ValueError,
+    EOFError,
+    MemoryError,
+    RuntimeError,
+    OverflowError,
+    zstandard.ZstdError,
+)
 """What the MCAP and compression libraries raise on damaged bytes."""
 
 _RECORD = struct.Struct("<BQ")
@@ -111,6 +120,7 @@ class McapFile:
             Span(index.chunk_start_offset, index.message_start_time, index.message_end_time)
             for index in sorted(summary.chunk_indexes, key=lambda index: index.chunk_start_offset)
         ]
+        stream.seek(0)
         reader = make_reader(stream)
         try:
             self.metadata = {record.name: record.metadata for record in reader.iter_metadata()}
@@ -171,6 +181,7 @@ def verified_summary(stream: BinaryIO) -> Summary | None:
     covered = stream.read(size - len(MAGIC) - 4 - start)
     if checksum and zlib.crc32(covered) != checksum:
         return None
+    stream.seek(0)
     try:
         summary = make_reader(stream).get_summary()
     except UNREADABLE:
@@ -205,3 +216,23 @@ def chunk_records(content: bytes) -> Iterator[Message | Schema | Channel]:
             yield Schema.read(ReadDataStream(BytesIO(content[body:offset])))
         elif opcode == Opcode.CHANNEL:
             yield Channel.read(ReadDataStream(BytesIO(content[body:offset])))
+
+
+def mcap_files(path: Path) -> list[Path]:
+    """Files of a bag, a directory or a bare file, in the order of the number at the end of their names.
+
+    Raises ConfigurationError when there is no such bag or its directory holds no .mcap file.
+    """
+    if path.is_dir():
+        files = sorted(path.glob("*.mcap"), key=lambda file: (_number(file.stem), file.name))
+        if not files:
+            raise ConfigurationError(f"{path}: holds no .mcap file")
+        return files
+    if not path.exists():
+        raise ConfigurationError(f"{path}: no such bag")
+    return [path]
+
+
+def _number(stem: str) -> int:
+    digits = stem.rpartition("_")[2]
+    return int(digits) if digits.isdecimal() else -1

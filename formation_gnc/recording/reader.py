@@ -1,7 +1,6 @@
 """Reading bags: raw messages in bounded memory, typed messages, and whole topics as NumPy arrays."""
 
 import heapq
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby, zip_longest
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.recording.decode import MessageType
-from formation_gnc.recording.mcap_file import McapFile
+from formation_gnc.recording.mcap_file import McapFile, mcap_files
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -65,7 +64,7 @@ class Bag:
     def __init__(self, path: str | Path) -> None:
         """Open a bag by its directory or file."""
         self.path = Path(path)
-        self._files = [McapFile(file) for file in _mcap_files(self.path)]
+        self._files = [McapFile(file) for file in mcap_files(self.path)]
         self.metadata = {name: data for file in self._files for name, data in file.metadata.items()}
         self.metadata.pop("rosbag2", None)  # rosbag2's own copy of metadata.yaml
         self.attachments = {name: data for file in self._files for name, data in file.attachments.items()}
@@ -242,20 +241,3 @@ def columns(arrays: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
             for index in range(array.shape[1]):
                 flat[f"{field}.{index}"] = array[:, index]
     return flat
-
-
-def _mcap_files(path: Path) -> list[Path]:
-    """Files of a bag in their order, that of the number rosbag2 puts at the end of the name."""
-    if path.is_dir():
-        files = sorted(path.glob("*.mcap"), key=lambda file: (_number(file.stem), file.name))
-        if not files:
-            raise ConfigurationError(f"{path}: holds no .mcap file")
-        return files
-    if not path.exists():
-        raise ConfigurationError(f"{path}: no such bag")
-    return [path]
-
-
-def _number(stem: str) -> int:
-    match = re.search(r"_(\d+)$", stem)
-    return int(match[1]) if match else -1

@@ -59,6 +59,7 @@ class TopicDefinition:
     type_name: str
     schema: bytes
     schema_encoding: str = "ros2msg"
+    message_encoding: str = "cdr"
     metadata: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
@@ -167,12 +168,14 @@ class BagWriter:
 
         data: its CDR bytes as they came. stamp_ns: simulated time in ns, not negative. sequence: the
         publisher's count, of which the file keeps the lower 32 bits.
-        Raises ConfigurationError when the topic was not added or the bag is closed.
+        Raises ConfigurationError when the stamp is negative, the topic was not added or the bag is closed.
         """
         try:
             entry = self._topics[topic]
         except KeyError:
             raise ConfigurationError(f"topic {topic!r}: was not added, or the bag is closed") from None
+        if stamp_ns < 0:
+            raise ConfigurationError(f"topic {topic!r}: stamp {stamp_ns} ns: must not be negative")
         if self._split is not None and self._is_full(self._split, stamp_ns):
             with self._guarded():
                 self._finish_file()
@@ -220,7 +223,9 @@ class BagWriter:
     def _start_file(self) -> None:
         path = self.directory / f"{self.directory.name}_{len(self._files)}.mcap"
         stream = path.open("xb")
-        mcap = Writer(stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+        limit = self._split.max_bytes if self._split is not None else None
+        chunk_bytes = CHUNK_BYTES if limit is None else min(CHUNK_BYTES, limit)
+        mcap = Writer(stream, chunk_size=chunk_bytes, compression=CompressionType.ZSTD, enable_data_crcs=True)
         mcap.start(profile="ros2", library=f"formation_gnc {__version__}, {LIBRARY_IDENTIFIER}")
         for name, values in self._metadata.items():
             mcap.add_metadata(name, values)
@@ -242,7 +247,9 @@ class BagWriter:
                 definition.type_name, definition.schema_encoding, definition.schema
             )
             file.schemas[definition.type_name] = schema
-        return file.mcap.register_channel(topic, "cdr", schema, dict(definition.metadata))
+        return file.mcap.register_channel(
+            topic, definition.message_encoding, schema, dict(definition.metadata)
+        )
 
     def _is_full(self, split: Split, stamp_ns: int) -> bool:
         file = self._file
@@ -283,7 +290,7 @@ class BagWriter:
                 "topic_metadata": {
                     "name": name,
                     "type": entry.definition.type_name,
-                    "serialization_format": "cdr",
+                    "serialization_format": entry.definition.message_encoding,
                     "offered_qos_profiles": entry.qos,
                     "type_description_hash": entry.definition.metadata.get("topic_type_hash", ""),
                 },
