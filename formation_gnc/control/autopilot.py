@@ -36,7 +36,7 @@ class AutopilotParameters(Schedulable):
         super().__post_init__()
         if not any(self.thrust_limit):
             raise ConfigurationError(
-                f"parameter thrust_limit: {list(self.thrust_limit)} is not allowed; an axis at least must push"
+                f"parameter thrust_limit: {list(self.thrust_limit)} is not allowed; one axis must push"
             )
 
 

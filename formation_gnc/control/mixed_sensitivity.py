@@ -1,0 +1,206 @@
+"""H-infinity synthesis of a position controller by mixed sensitivity (Neokleous ch. 5).
+
+The loop is y = G u + d with G from acceleration to relative position. With S = (I + G K)^-1, T = I - S, the
+controller u = -K y keeps the largest singular value of
+
+    [w_P S; w_T T; w_u K S]
+
+below gamma at all frequencies. Units of time are 1 / `rate` inside, so that numbers are of order one.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.linalg import LinAlgError, expm, solve_continuous_are
+
+from formation_gnc.errors import DesignError
+from formation_gnc.interface import Matrix, Vector
+
+LARGEST_GAMMA = 1e6
+
+
+@dataclass(frozen=True)
+class Weight:
+    """A first-order weight on each of the three channels: direct + residue / (s + pole)."""
+
+    direct: Vector
+    residue: Vector
+    pole: Vector
+
+    @classmethod
+    def performance(cls, bandwidth: Vector, peak: Vector, steady: Vector) -> "Weight":
+        """w_P = (s / M + w_B) / (s + w_B A), whose inverse bounds S (Neokleous 5.7)."""
+        pole = bandwidth * steady
+        return cls(1.0 / peak, bandwidth - pole / peak, pole)
+
+    @classmethod
+    def uncertainty(cls, time: Vector, low: Vector, high: Vector) -> "Weight":
+        """w_T = (tau s + r_0) / (tau / r_inf s + 1), whose inverse bounds T (Neokleous 5.42)."""
+        pole = high / time
+        return cls(high, (low - high) * pole, pole)
+
+    def at(self, frequency: Vector) -> Matrix:
+        """(N, 3) magnitudes at frequencies (N,), rad/s."""
+        return np.abs(self.direct + self.residue / (1j * frequency[:, None] + self.pole))
+
+
+@dataclass(frozen=True)
+class LinearController:
+    """States xi of a controller of a measured error v: dxi/dt = A xi + B v, u = C xi + D v; or the same per
+    tick."""
+
+    a: Matrix
+    b: Matrix
+    c: Matrix
+    d: Matrix
+
+    def discretised(self, tick: float) -> "LinearController":
+        """Exact for an error held over the tick."""
+        size, inputs = self.b.shape
+        joint = np.zeros((size + inputs, size + inputs))
+        joint[:size, :size], joint[:size, size:] = self.a, self.b
+        joint = expm(joint * tick)
+        return LinearController(joint[:size, :size], joint[:size, size:], self.c, self.d)
+
+    def closed_loop(self, a: Matrix, b: Matrix) -> Matrix:
+        """(6 + n, 6 + n) matrix of plant and controller together, for a plant a (6, 6), b (6, 3), both per
+        tick or not."""
+        seen = np.eye(6)[: self.b.shape[1]]
+        return np.block([[a + b @ self.d @ seen, b @ self.c], [self.b @ seen, self.a]])
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A mixed-sensitivity problem in SI units, per channel (x, y, z of the Hill frame)."""
+
+    dynamics: Matrix
+    """(6, 6) continuous matrix of relative motion."""
+    performance: Weight
+    uncertainty: Weight
+    effort: Vector
+    """(3,) w_u: position over acceleration, s^2."""
+    pole_shift: float
+    """Shift e of the plant's poles to the right, 1/s: out of the imaginary axis (Neokleous 5.6)."""
+    disturbance: float
+    """Acceleration that counts like a metre of disturbance of the position, 1/s^2."""
+
+    def synthesise(self, full_information: bool, margin: float) -> tuple[LinearController, float, float]:
+        """Controller in SI units, best gamma, and the gamma that it was designed for: (1 + margin) times the
+        best.
+
+        A controller at the best gamma itself has poles without bound.
+
+        Raises:
+            DesignError: poles on the imaginary axis, or no controller at any gamma.
+        """
+        if not (self.pole_shift > 0.0 or self.disturbance > 0.0):
+            raise DesignError(
+                "orbital motion has poles on the imaginary axis: give a pole_shift or a disturbance above zero"
+            )
+        if full_information and not self.disturbance > 0.0:
+            raise DesignError("the full-information form needs a disturbance above zero to work against")
+        solve = self._full_information if full_information else self._output_feedback
+        try:
+            return solve(margin)
+        except (ArithmeticError, ValueError) as error:
+            raise DesignError(f"no controller at any gamma for these weights ({error})") from error
+
+    @property
+    def rate(self) -> float:
+        """Inverse of the unit of time of the scaled problem, 1/s."""
+        return float((self.performance.residue + self.performance.pole * self.performance.direct).max())
+
+    def _scaled(self) -> tuple[Matrix, Matrix, Matrix, Vector, float]:
+        """A, B, C of plant with the states of w_P and w_T (12), then w_u and the disturbance, in units of
+        time 1 / rate."""
+        rate, eye, nil = self.rate, np.eye(3), np.zeros((3, 3))
+        unit = np.repeat([1.0, rate], 3)
+        a = np.zeros((12, 12))
+        a[:6, :6] = self.dynamics * np.outer(1.0 / unit, unit) / rate + self.pole_shift / rate * np.eye(6)
+        a[6:9, :3] = a[9:, :3] = eye
+        a[6:9, 6:9] = -np.diag(self.performance.pole) / rate
+        a[9:, 9:] = -np.diag(self.uncertainty.pole) / rate
+        b = np.vstack([nil, eye, nil, nil])
+        c = np.block(
+            [
+                [np.diag(self.performance.direct), nil, np.diag(self.performance.residue) / rate, nil],
+                [np.diag(self.uncertainty.direct), nil, nil, np.diag(self.uncertainty.residue) / rate],
+            ]
+        )
+        return a, b, c, self.effort * rate**2, self.disturbance / rate**2
+
+    def _output_feedback(self, margin: float) -> tuple[LinearController, float, float]:
+        # Imported here: with Matplotlib behind them, they would cost every other law a second at the start.
+        import control
+        import slycot  # type: ignore[import-untyped]
+
+        a, b2, c1, effort, disturbance = self._scaled()
+        eye, nil = np.eye(3), np.zeros((3, 3))
+        channels = np.vstack([nil, nil, eye, nil])
+        b = np.hstack([disturbance * b2, channels, b2])
+        c = np.vstack([c1, np.zeros((3, 12)), np.hstack([eye, np.zeros((3, 9))])])
+        d = np.zeros((12, 9))
+        d[:3, 3:6] = np.diag(self.performance.direct)
+        d[6:9, 6:] = np.diag(effort)
+        d[9:, 3:6] = eye
+        _, _, best, _ = control.hinfsyn(control.ss(a, b, c, d), 3, 3)
+        gamma = (1.0 + margin) * best
+        ak, bk, ck, dk, _ = slycot.sb10fd(12, 9, 12, 3, 3, gamma, a, b, c, d)
+        return self._unscaled(ak, bk, ck, dk, np.ones(3)), best, gamma
+
+    def _full_information(self, margin: float) -> tuple[LinearController, float, float]:
+        a, b, c, effort, disturbance = self._scaled()
+
+        def gain(gamma: float) -> Matrix | None:
+            r = np.diag(np.concatenate([effort**2, np.full(3, -(gamma**2))]))
+            try:
+                x = solve_continuous_are(a, np.hstack([b, disturbance * b]), c.T @ c, r)
+            except (LinAlgError, ValueError):
+                return None
+            result: Matrix = -(b.T @ x) / effort[:, None] ** 2
+            worst = disturbance**2 / gamma**2 * b @ b.T @ x
+            stable = (np.linalg.eigvals(a + b @ result + worst).real < 0.0).all()
+            return result if stable and np.linalg.eigvalsh(x).min() > -1e-9 * np.abs(x).max() else None
+
+        high, low = LARGEST_GAMMA * disturbance, 0.0
+        if gain(high) is None:
+            raise ValueError(f"none even at gamma = {high:.3g}")
+        while high - low > 1e-3 * high:
+            middle = 0.5 * (high + low)
+            high, low = (middle, low) if gain(middle) is not None else (high, middle)
+        gamma = (1.0 + margin) * high
+        feedback = gain(gamma)
+        if feedback is None:
+            raise ValueError(f"none at gamma = {gamma:.3g}")
+        inputs = np.hstack([np.vstack([np.eye(3), np.eye(3)]), np.zeros((6, 3))])
+        controller = self._unscaled(
+            a[6:, 6:], inputs, feedback[:, 6:], feedback[:, :6], np.repeat([1.0, self.rate], 3)
+        )
+        return controller, high, gamma
+
+    def _unscaled(self, a: Matrix, b: Matrix, c: Matrix, d: Matrix, unit: Vector) -> LinearController:
+        """The controller in SI units; `unit` is the SI size of one scaled unit of each measured error."""
+        rate = self.rate
+        return LinearController(a * rate, b / unit * rate, c * rate**2, d / unit * rate**2)
+
+    def singular_values(self, controller: LinearController, frequency: Vector) -> dict[str, Matrix]:
+        """Singular values (N, 3) of S, T, KS and T_I = K (I + G K)^-1 G over frequencies (N,), on the plant
+        itself."""
+        eye6, seen = np.eye(6), np.eye(6)[: controller.b.shape[1]]
+        result: dict[str, Any] = {"S": [], "T": [], "KS": [], "T_I": []}
+        b = np.vstack([np.zeros((3, 3)), np.eye(3)])
+        for w in frequency:
+            states = np.linalg.solve(1j * w * eye6 - self.dynamics, b)
+            k = -(
+                controller.c
+                @ np.linalg.solve(1j * w * np.eye(len(controller.a)) - controller.a, controller.b)
+                + controller.d
+            )
+            if len(seen) == 6:  # a disturbance of the position is one of its rate as well
+                k = k @ np.vstack([np.eye(3), 1j * w * np.eye(3)])
+            g = states[:3]
+            s = np.linalg.inv(np.eye(3) + g @ k)
+            for name, value in (("S", s), ("T", np.eye(3) - s), ("KS", k @ s), ("T_I", k @ s @ g)):
+                result[name].append(np.linalg.svd(value, compute_uv=False))
+        return {name: np.array(values) for name, values in result.items()}
