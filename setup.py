@@ -23,5 +23,10 @@ setup(
     description="Formation-flying GNC as a lock-step ROS 2 node graph.",
     license="Apache-2.0",
     extras_require={"test": ["pytest"]},
-    entry_points={"console_scripts": [f"{node} = {NAME}.nodes.{node}:main" for node in NODES]},
+    entry_points={
+        "console_scripts": [
+            *(f"{node} = {NAME}.nodes.{node}:main" for node in NODES),
+            f"formation-gnc = {NAME}.cli:main",
+        ]
+    },
 )

@@ -3,12 +3,9 @@
 set -eo pipefail  # no -u: the scripts of ROS read unset variables
 cd "$(dirname "$0")/.."
 
-read -r ros _ < .ros
-if [[ $ros == wheels ]]; then
+if [[ -e .venv/local_setup.bash ]]; then
+    # The wheels are all of the ROS environment: nothing of another one, perhaps sourced, is to be chained.
     unset AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH PYTHONPATH
-    source .venv/setup.bash
-elif [[ :${AMENT_PREFIX_PATH:-}: != *:$ros:* ]]; then
-    source "$ros/setup.bash"
 fi
-PATH=$PWD/.venv/bin:$PATH  # CMake takes the Python that it finds first
+source .venv/setup.bash
 colcon build --event-handlers desktop_notification- status-

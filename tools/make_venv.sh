@@ -76,6 +76,15 @@ install() { # awk condition on the lines of the lock that name a package
 }
 install '/^setuptools=/'  # first: it builds empy, the only one that comes as source
 install "!/$left_out/"
+
+# Either way .venv/setup.* gives the environment that both packages are built in.
 if [[ $ros == wheels ]]; then
     .venv/bin/python tools/ros_prefix.py
+else
+    for shell in sh bash zsh; do
+        cat > ".venv/setup.$shell" << END
+case ":\$AMENT_PREFIX_PATH:" in *":$ros:"*) ;; *) . "$ros/setup.$shell" ;; esac
+export PATH="$PWD/.venv/bin:\$PATH"
+END
+    done
 fi

@@ -1,0 +1,188 @@
+"""The packages as colcon sees them, the environment as a user gets it, and what a lacking machine is told."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import formation_gnc
+
+ROOT = Path(__file__).resolve().parents[1]
+NODES = {"plant", "navigation", "guidance", "controller", "recorder"}
+
+needs_set_up = pytest.mark.skipif(not (ROOT / "install/.ready").exists(), reason="needs `make setup`")
+
+
+def run(*command: str, cwd: Path = ROOT, **variables: str) -> subprocess.CompletedProcess[str]:
+    """Run a command as in a fresh shell, with `variables` on top of the least environment."""
+    environment = {"PATH": os.environ["PATH"], "HOME": os.environ["HOME"], **variables}
+    return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, timeout=300)
+
+
+def colcon_list(cwd: Path, *arguments: str) -> dict[str, str]:
+    """Return the build type of every package that colcon finds, by name."""
+    listing = run(sys.executable, "-m", "colcon", "list", *arguments, cwd=cwd)
+    assert listing.returncode == 0, listing.stderr
+    rows = (line.split("\t") for line in listing.stdout.splitlines())
+    return {name: kind.strip("()") for name, _, kind in rows}
+
+
+def workspace(folder: Path) -> Path:
+    """Lay out a ROS workspace, as the README says, with a copy of what is under version control."""
+    listing = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True)
+    clone = folder / "src/formation_gnc"
+    for name in filter(lambda name: (ROOT / name).is_file(), listing.stdout.splitlines()):
+        (clone / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(ROOT / name, clone / name)
+    (folder / "src/formation_gnc_msgs").symlink_to("formation_gnc/msg_defs")
+    return folder
+
+
+def without(folder: Path, *tools: str) -> str:
+    """Make a `bin` in which the tools that the set-up calls are found, but not these; return it as PATH."""
+    (folder / "bin").mkdir()
+    for tool in {"bash", "dirname", "cc", "c++"} - set(tools):
+        (folder / "bin" / tool).symlink_to(shutil.which(tool) or f"/usr/bin/{tool}")
+    return str(folder / "bin")
+
+
+def test_colcon_takes_both_for_ros_packages_from_the_repository_root():
+    # An invalid package.xml is no error to colcon: it falls back to plain `python` and `cmake` and
+    # loses the order in which to build.
+    assert colcon_list(ROOT) == {"formation_gnc": "ros.ament_python", "formation_gnc_msgs": "ros.ament_cmake"}
+
+
+def test_colcon_takes_both_for_ros_packages_in_a_workspace(tmp_path):
+    assert colcon_list(workspace(tmp_path)) == {
+        "formation_gnc": "ros.ament_python",
+        "formation_gnc_msgs": "ros.ament_cmake",
+    }
+
+
+def test_versions_agree():
+    stated = {
+        "package.xml": "<version>{}</version>",
+        "msg_defs/package.xml": "<version>{}</version>",
+        "setup.py": 'version="{}"',
+    }
+    for name, statement in stated.items():
+        assert statement.format(formation_gnc.__version__) in (ROOT / name).read_text(), name
+
+
+@needs_set_up
+@pytest.mark.parametrize("shell", ["bash", "zsh"])
+def test_environment_from_any_directory(shell, tmp_path):
+    if shutil.which(shell) is None:
+        pytest.skip(f"no {shell} here")
+    script = f"""
+        cd {tmp_path} && source {ROOT}/env.sh || exit
+        command -v formation-gnc
+        python -c 'import rclpy, formation_gnc, formation_gnc_msgs.msg; print(formation_gnc.__file__)'
+        echo $ROS_AUTOMATIC_DISCOVERY_RANGE $RMW_IMPLEMENTATION $OMP_NUM_THREADS
+        command -v plant recorder || echo no node on PATH
+    """
+    result = run(shell, "-c", script)
+    assert result.stderr == ""
+    command, package, settings, nodes = result.stdout.splitlines()
+    assert command == f"{ROOT}/install/formation_gnc/bin/formation-gnc"
+    # The sources themselves, or links to them: a change of a Python file needs no build.
+    assert Path(package).resolve() == ROOT / "formation_gnc/__init__.py"
+    assert settings == "LOCALHOST rmw_fastrtps_cpp 1"
+    assert nodes == "no node on PATH"
+
+
+@needs_set_up
+def test_environment_leaves_the_users_settings_alone():
+    script = f"set -eu; source {ROOT}/env.sh; echo $ROS_AUTOMATIC_DISCOVERY_RANGE $OMP_NUM_THREADS; echo $-"
+    result = run("bash", "-c", script, ROS_AUTOMATIC_DISCOVERY_RANGE="SUBNET", OMP_NUM_THREADS="2")
+    settings, options = result.stdout.splitlines()
+    assert settings == "SUBNET 2"
+    assert set("eu") <= set(options)
+
+
+@needs_set_up
+def test_environment_names_a_middleware_that_is_not_there():
+    script = f"source {ROOT}/env.sh; echo status $?"
+    result = run("bash", "-c", script, RMW_IMPLEMENTATION="rmw_unheard_of_cpp")
+    assert result.stdout == "status 1\n"
+    assert result.stderr.count("\n") == 1
+    assert "rmw_unheard_of_cpp is not installed" in result.stderr
+
+
+def test_environment_before_the_build_says_what_to_run_and_keeps_the_shell(tmp_path):
+    shutil.copy(ROOT / "env.sh", tmp_path)
+    result = run("bash", "-c", f"source {tmp_path}/env.sh; echo still here")
+    assert result.stdout == "still here\n"
+    assert result.stderr.count("\n") == 1
+    assert "make setup" in result.stderr
+
+
+@needs_set_up
+def test_every_node_is_where_ros2_run_looks_and_runs_in_the_projects_python():
+    executables = ROOT / "install/formation_gnc/lib/formation_gnc"
+    assert {path.name for path in executables.iterdir()} >= NODES
+    for node in NODES:
+        assert os.access(executables / node, os.X_OK)
+        assert (executables / node).read_text().startswith(f"#!{ROOT}/.venv/bin/python")
+
+
+def test_another_ros_is_refused_in_one_line():
+    result = run("tools/find_ros.sh", ROS_DISTRO="humble")
+    assert (result.returncode, result.stdout) == (2, "")
+    assert re.fullmatch(r"formation_gnc: .*Jazzy.*humble.*\n", result.stderr)
+
+
+def test_a_sourced_jazzy_is_used_and_a_virtual_environment_with_the_wheels_is_not(tmp_path):
+    for prefix in ("jazzy", "wheels"):
+        (tmp_path / prefix / "share/rclpy").mkdir(parents=True)
+    (tmp_path / "wheels/pyvenv.cfg").touch()
+    prefixes = f"{tmp_path}/overlay:{tmp_path}/wheels:{tmp_path}/jazzy"
+    result = run("tools/find_ros.sh", ROS_DISTRO="jazzy", AMENT_PREFIX_PATH=prefixes)
+    assert result.stdout == f"{tmp_path}/jazzy\n"
+    if not Path("/opt/ros/jazzy").exists():
+        result = run("tools/find_ros.sh", ROS_DISTRO="jazzy", AMENT_PREFIX_PATH=f"{tmp_path}/wheels")
+        assert result.stdout == "wheels\n"
+
+
+@pytest.mark.parametrize(
+    ("lacking", "advice"), [("c++", "install g++"), ("python3.12", "install python3.12")]
+)
+def test_a_machine_without_is_told_in_one_line_what_to_install(lacking, advice, tmp_path):
+    shutil.copytree(ROOT / "tools", tmp_path / "tools")
+    (tmp_path / ".ros").write_text(f"wheels for {tmp_path}\n")
+    result = run(
+        "tools/make_venv.sh", cwd=tmp_path, PATH=without(tmp_path, lacking), PYENV_ROOT=str(tmp_path)
+    )
+    assert (result.returncode, result.stdout) == (2, "")
+    assert result.stderr.count("\n") == 1
+    assert advice in result.stderr
+    assert not (tmp_path / ".venv").exists()
+
+
+def test_the_lock_pins_every_package_with_its_hashes():
+    for name in ("requirements.lock", "requirements-verify.lock"):
+        entries = re.split(r"\n(?=[a-z0-9])", (ROOT / name).read_text().split("\n", 2)[2])
+        assert len(entries) > 10
+        for entry in entries:
+            assert re.match(r"[a-z0-9-]+==\S+ \\\n    --hash=sha256:[0-9a-f]{64}", entry), entry.split("\n")[
+                0
+            ]
+
+
+@needs_set_up
+@pytest.mark.slow  # builds both packages from nothing: about half a minute
+def test_a_plain_build_in_a_workspace_stands_alone(tmp_path):
+    folder = workspace(tmp_path)
+    build = run("bash", "-c", f"source {ROOT}/.venv/setup.bash && colcon build", cwd=folder)
+    assert build.returncode == 0, build.stderr
+    imports = "import formation_gnc, formation_gnc_msgs.msg; print(formation_gnc.__file__)"
+    result = run("bash", "-c", f"source {folder}/install/setup.bash && python3 -c '{imports}'", cwd=tmp_path)
+    assert Path(result.stdout.strip()).is_relative_to(folder / "install"), result.stderr
+    share = folder / "install/formation_gnc/share/formation_gnc"
+    assert {path.name for path in (ROOT / "params").glob("*.yaml")} == {
+        p.name for p in (share / "params").iterdir()
+    }
