@@ -83,12 +83,14 @@ class NodalElements:
 def mean_elements(osculating: NodalElements) -> NodalElements:
     """Mean elements, to first order in J2: those without the short-period perturbations."""
     target = osculating.array
+    scale = np.array([osculating.semi_major_axis, 1.0, 1.0, 1.0, 1.0, 1.0])
     mean = target
     for _ in range(20):  # each round gains three digits
         following = target - _short_period(NodalElements(*mean))
-        if np.array_equal(following, mean):
-            break
+        settled = np.abs((following - mean) / scale).max() < 1e-15
         mean = following
+        if settled:
+            break
     return NodalElements(*(float(value) for value in mean))
 
 

@@ -105,8 +105,8 @@ class RelativeModel(ABC):
     def bounded(self, time: float, state: Array) -> Array:
         """(6,) state whose along-track rate is such that the free motion does not drift along the track.
 
-        One condition for every model: after one period the along-track position is what it was. Position and
-        the other rates are those of `state`.
+        Position and the other rates are those of `state`. The condition here is that the along-track position
+        after one period is what it was; a model with a better one states it.
         """
         result = np.array(state, dtype=np.float64)
         for _ in range(50):  # Newton; a linear model arrives in one step

@@ -1,9 +1,11 @@
 """The nonlinear equations of relative motion about an eccentric chief, and their Jacobian."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from formation_gnc.errors import ConfigurationError
 from formation_gnc.relative.chief import ChiefState, KeplerChief, frame_matrix
 from formation_gnc.relative.factorisation import sdc1
 from formation_gnc.relative.model import INPUT, NO_THRUST, ON_THE_CHIEF, Array, RelativeModel
@@ -39,6 +41,26 @@ class NonlinearModel(RelativeModel):
     def dynamics(self, time: float, state: Array = ON_THE_CHIEF) -> Array:
         """(6, 6) Jacobian at the state: Joshi (6.27)-(6.40)."""
         return jacobian(state, self.chief.at(time))
+
+    def bounded(self, time: float, state: Array) -> Array:
+        """(6,) state whose along-track rate gives the deputy the chief's energy: both then take one period.
+
+        Raises:
+            ConfigurationError: if the other rates alone already exceed that energy.
+        """
+        chief = self.chief.at(time)
+        x, y, z, vx, _, vz = (float(value) for value in state)
+        radial_rate = -0.5 * chief.angular_acceleration * chief.radius / chief.angular_rate
+        distance = math.sqrt((chief.radius + x) ** 2 + y**2 + z**2)
+        square = chief.mu * (2.0 / distance - 1.0 / self.chief.semi_major_axis)
+        square -= (radial_rate + vx - chief.angular_rate * y) ** 2 + vz**2
+        if square < 0.0:
+            raise ConfigurationError(
+                f"relative state {[x, y, z, vx, vz]}: no along-track rate gives it the energy of the chief"
+            )
+        result = np.array(state, dtype=np.float64)
+        result[4] = math.sqrt(square) - chief.angular_rate * (chief.radius + x)
+        return result
 
 
 def jacobian(state: Array, chief: ChiefState) -> Array:
