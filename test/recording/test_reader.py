@@ -1,5 +1,7 @@
 import builtins
 import struct
+import subprocess
+import sys
 import tracemalloc
 from contextlib import suppress
 from itertools import groupby
@@ -322,3 +324,11 @@ def test_read_without_pandas_says_how_to_get_it(bag_path, monkeypatch) -> None:
     monkeypatch.setattr(builtins, "__import__", without_pandas)
     with pytest.raises(ConfigurationError, match="pip install pandas"):
         read(bag_path)
+
+
+def test_reading_needs_no_ros() -> None:
+    script = (
+        "import sys, formation_gnc.recording; print({'rclpy', 'ament_index_python'} & sys.modules.keys())"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "set()"
