@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from time import monotonic
 from typing import Any
 
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from formation_gnc_msgs.msg import Thrust as ThrustMessage
 from rclpy._rclpy_pybind11 import NodeNameNonExistentError
@@ -14,7 +13,7 @@ from rosgraph_msgs.msg import Clock
 from formation_gnc.interface import NANOSECONDS, Event, Measurement, Thrust, Truth, Vector
 from formation_gnc.nodes import topics
 from formation_gnc.nodes.conversion import from_message, message_type, to_message
-from formation_gnc.nodes.shell import ConfiguredNode, run, spin
+from formation_gnc.nodes.shell import STOP, ConfiguredNode, run, spin
 from formation_gnc.plant.plant import Plant, PlantParameters
 
 PARTS = ("navigation", "guidance", "controller")
@@ -218,15 +217,14 @@ class PlantNode(ConfiguredNode):
 
 def fly(node: PlantNode) -> None:
     """Fly the run to its end, and see the recorder through."""
-    spin(node, node.done, node.check, lambda: node.period)
+    spin(node, (node.done, STOP), node.check, lambda: node.period)
     recorded = Future()
 
     def check() -> None:
         if not node.wait_for_recorder():
             recorded.set_result(None)
 
-    if rclpy.ok():
-        spin(node, recorded, check, lambda: CHECK_PERIOD)
+    spin(node, (recorded, STOP), check, lambda: CHECK_PERIOD)
 
 
 def main() -> int:

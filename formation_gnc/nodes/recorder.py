@@ -1,7 +1,6 @@
 """The recorder node: every topic, byte for byte, into an MCAP bag."""
 
 import json
-import signal
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,13 +24,10 @@ from formation_gnc.nodes import topics
 from formation_gnc.nodes.shell import ConfiguredNode, run, spin
 from formation_gnc.parameters import parameter
 from formation_gnc.recording.provenance import provenance
-from formation_gnc.recording.writer import BagWriter
+from formation_gnc.recording.writer import FLUSH_INTERVAL, BagWriter
 
 LOOK_PERIOD = 0.1
 """Wall time (s) between looks for new topics and nodes, and between reports of progress."""
-
-FLUSH_PERIOD = 0.25
-"""Wall time (s) after which what was recorded is on disk: what a power cut can take."""
 
 REPORT_TICKS = 64
 """Ticks after which progress is reported at the latest."""
@@ -69,7 +65,7 @@ class RecorderNode(ConfiguredNode):
         self._reported = -1
         self._last_message = monotonic()
         self.create_timer(LOOK_PERIOD, self._look)
-        self.create_timer(FLUSH_PERIOD, self.bag.flush)
+        self.create_timer(FLUSH_INTERVAL, self.bag.flush)
 
     def is_quiet(self) -> bool:
         """Whether nothing has come for a while."""
@@ -164,16 +160,14 @@ def _first_stamp(data: bytes) -> int:
 
 def record(node: RecorderNode) -> None:
     """Record until told to stop, and then until nothing more comes."""
-    stopped, quiet = Future(), Future()
-    for name in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(name, lambda *_: stopped.done() or stopped.set_result(None))
+    quiet = Future()
     try:
-        spin(node, stopped, period=lambda: LOOK_PERIOD)
-        spin(node, quiet, lambda: node.is_quiet() and quiet.set_result(None), lambda: LOOK_PERIOD)
+        spin(node)
+        spin(node, (quiet,), lambda: node.is_quiet() and quiet.set_result(None))
     finally:
         node.close()
 
 
 def main() -> int:
-    """Run the node; it handles its own signals, since a bag is closed only when all has come."""
-    return run(RecorderNode, record, handle_signals=False)
+    """Run the node."""
+    return run(RecorderNode, record)

@@ -1,18 +1,21 @@
 """What all nodes share: parameters from a schema, the main loop, and the shell of a part."""
 
+import signal
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from pathlib import Path
 from time import monotonic, perf_counter
 from typing import Any
 
 import rclpy
+import yaml
 from formation_gnc_msgs.msg import Timing
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.duration import Duration
 from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, RMWError, UnknownROSArgsError
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.service import Service
@@ -35,6 +38,9 @@ from formation_gnc.part import Part
 REFUSED_BY_ROS = (RCLInvalidROSArgsError, UnknownROSArgsError, RCLError, RMWError)
 """What rclpy raises for arguments, parameter files and middleware it cannot use."""
 
+CHECK_PERIOD = 0.1
+"""Wall time (s) after which a node notices at the latest that it has been asked to stop."""
+
 FAREWELL = 1.0
 """Wall time (s) that a node waits at its end for its last messages to arrive."""
 
@@ -52,7 +58,12 @@ class ConfiguredNode(Node):  # type: ignore[misc]
     def __init__(self, name: str, schema: type, namespace: str = "") -> None:
         """Declare the schema's parameters with the values given on the command line and in parameter files."""
         try:
-            super().__init__(name, namespace=namespace, automatically_declare_parameters_from_overrides=True)
+            super().__init__(
+                name,
+                namespace=namespace,
+                parameter_overrides=list(_from_command_line(sys.argv)),
+                automatically_declare_parameters_from_overrides=True,
+            )
         except ValueError as error:  # an empty list has no type for ROS
             raise ConfigurationError(f"a parameter is an empty list; leave it out ({error})") from None
         given = {
@@ -75,6 +86,17 @@ class ConfiguredNode(Node):  # type: ignore[misc]
         for publisher in self.publishers:
             publisher.wait_for_all_acked(Duration(seconds=max(0.0, deadline - monotonic())))
         super().destroy_node()
+
+
+def _from_command_line(arguments: Sequence[str]) -> Iterator[Parameter]:
+    """Parameters given with ``-p name:=value``.
+
+    rclpy knows them too, but there a parameter file's section for the node goes before them, whatever the order: who types one means it.
+    """
+    for flag, rule in pairwise(arguments):
+        name, separator, value = rule.partition(":=")
+        if flag in ("-p", "--param") and separator and ":" not in name:
+            yield Parameter(name, value=yaml.safe_load(value))
 
 
 def _descriptor(leaf: Leaf) -> ParameterDescriptor:
@@ -164,41 +186,45 @@ def _answer_from(pool: ThreadPoolExecutor, service: Service) -> None:
     )
 
 
+STOP = Future()
+"""Done when the process has been asked to stop, by SIGINT or SIGTERM."""
+
+
 def spin(
     node: Node,
-    until: Future | None = None,
+    until: Sequence[Future] = (STOP,),
     check: Callable[[], None] = lambda: None,
-    period: Callable[[], float] = lambda: 0.5,
+    period: Callable[[], float] = lambda: CHECK_PERIOD,
 ) -> None:
-    """Let a node work until it is interrupted or `until` is done; `check` is called every `period` (s) or sooner."""
+    """Let a node work until any of the futures is done; `check` is called every `period` (s) or sooner."""
     executor = Executor()
     executor.add_node(node)
-    until = until or Future()
     try:
-        while rclpy.ok() and not until.done():
-            executor.spin_until_future_complete(until, timeout_sec=period())
+        while not any(future.done() for future in until):
+            executor.spin_until_future_complete(until[0], timeout_sec=period())
             check()
     finally:
         executor.remove_node(node)
 
 
-def run(make_node: Callable[[], Any], fly: Callable[[Any], None] = spin, handle_signals: bool = True) -> int:
+def run(make_node: Callable[[], ConfiguredNode], fly: Callable[[Any], None] = spin) -> int:
     """Body of every executable: make the node, let it fly, and end with the exit status.
+
+    Signals only set `STOP`, since a node that has been asked to stop still has to hand over what it published or recorded.
 
     Returns:
         0 after an ordinary end or an interruption, 2 when something given to the node is not allowed.
     """
     node = None
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: STOP.done() or STOP.set_result(None))
     try:
-        handlers = SignalHandlerOptions.ALL if handle_signals else SignalHandlerOptions.NO
-        rclpy.init(args=sys.argv, signal_handler_options=handlers)
+        rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
         node = make_node()
         fly(node)
     except (ConfigurationError, *REFUSED_BY_ROS) as refusal:
         print(f"{Path(sys.argv[0]).name}: {' '.join(str(refusal).split())}", file=sys.stderr)
         return 2
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
     finally:
         if node is not None:
             node.destroy_node()

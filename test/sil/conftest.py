@@ -1,0 +1,152 @@
+"""Real node processes for software-in-the-loop tests, started as a user starts them."""
+
+import os
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import domain_coordinator
+import pytest
+
+from formation_gnc.nodes.launcher import executable
+from formation_gnc.sil.scenario import find_scenario
+
+GNC_TOPICS = (
+    "/clock",
+    "/truth",
+    *(f"/deputy1/{topic}" for topic in ("measurement", "estimate", "target", "thrust", "status")),
+)
+PARTS = ("navigation", "guidance", "controller")
+PATIENCE = 90.0  # s of wall time, for a machine that is busy with other things
+
+
+def wait_until(condition: Callable[[], bool], what: str, patience: float = PATIENCE) -> None:
+    """Wait for something to become true, or fail the test saying what did not."""
+    end = time.monotonic() + patience
+    while not condition():
+        assert time.monotonic() < end, f"not within {patience:g} s: {what}"
+        time.sleep(0.05)
+
+
+class Terminal:
+    """A node started by hand, with what it printed."""
+
+    def __init__(self, kind: str, arguments: list[str], environment: dict[str, str], directory: Path) -> None:
+        ros2 = shutil.which("ros2")
+        command = [ros2, "run", "formation_gnc", kind] if ros2 else [str(executable(kind))]
+        self.log = directory / f"{kind}-{time.monotonic_ns()}.log"
+        with self.log.open("wb") as stream:
+            self.process = subprocess.Popen(
+                [*command, "--ros-args", *arguments],
+                stdin=subprocess.DEVNULL,
+                stdout=stream,
+                stderr=subprocess.STDOUT,
+                env=environment,
+                start_new_session=True,  # ros2 run does not pass signals on: the group gets them
+            )
+
+    @property
+    def text(self) -> str:
+        return self.log.read_text(errors="replace")
+
+    def signal(self, number: signal.Signals) -> None:
+        os.killpg(self.process.pid, number)
+
+    def wait(self, patience: float = PATIENCE) -> int:
+        return self.process.wait(patience)
+
+
+class Desk:
+    """A desk with several terminals, all in one ROS domain of its own."""
+
+    def __init__(self, directory: Path, domain: int) -> None:
+        self.directory = directory
+        self.domain = domain
+        self.environment = os.environ | {"ROS_DOMAIN_ID": str(domain)}
+        self.parameters = find_scenario("leader_follower")
+        self.terminals: list[Terminal] = []
+
+    def start(self, kind: str, **parameters: object) -> Terminal:
+        arguments = ["--params-file", str(self.parameters)]
+        for name, value in parameters.items():
+            arguments += ["-p", f"{name}:={str(value).lower() if isinstance(value, bool) else value}"]
+        terminal = Terminal(kind, arguments, self.environment, self.directory)
+        self.terminals.append(terminal)
+        return terminal
+
+    def clear(self) -> None:
+        for terminal in self.terminals:
+            if terminal.process.poll() is None:
+                terminal.signal(signal.SIGKILL)
+                terminal.wait()
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Iterator[Desk]:
+    with domain_coordinator.domain_id() as domain:
+        desk = Desk(tmp_path, domain)
+        yield desk
+        desk.clear()
+
+
+class Sil:
+    """A running `formation-gnc sil`."""
+
+    def __init__(self, directory: Path, scenario: str, *arguments: str) -> None:
+        self.bag = directory / "bag"
+        self.process = subprocess.Popen(
+            ["formation-gnc", "sil", scenario, "--bag", str(self.bag), *arguments],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            cwd=directory,
+            start_new_session=True,
+        )
+
+    def children(self) -> dict[str, int]:
+        """Process numbers of the nodes by executable name."""
+        listed = subprocess.run(
+            ["ps", "--ppid", str(self.process.pid), "-o", "pid=,args="], capture_output=True, text=True, check=False
+        ).stdout
+        found = {}
+        for line in listed.splitlines():
+            pid, *words = line.split()
+            for word in words:
+                if "/lib/formation_gnc/" in word:
+                    found[Path(word).name] = int(pid)
+        return found
+
+    def recorded_bytes(self) -> int:
+        return sum(path.stat().st_size for path in self.bag.glob("*.mcap"))
+
+    def wait_for_flight(self) -> None:
+        """Until messages of the flight are on disk: far more than the topics' definitions alone."""
+        wait_until(lambda: self.recorded_bytes() > 100_000 or self.process.poll() is not None, "the flight to be recorded")
+        assert self.process.poll() is None, self.process.stderr.read() if self.process.stderr else ""
+
+    def finish(self, patience: float = PATIENCE) -> tuple[int, str, str]:
+        output, errors = self.process.communicate(timeout=patience)
+        return self.process.returncode, output, errors
+
+
+@pytest.fixture
+def sil(tmp_path: Path) -> Iterator[Callable[..., Sil]]:
+    started: list[Sil] = []
+
+    def start(*arguments: str, directory: Path = tmp_path, scenario: str = "leader_follower") -> Sil:
+        directory.mkdir(exist_ok=True)
+        started.append(Sil(directory, scenario, *arguments))
+        return started[-1]
+
+    yield start
+    for each in started:
+        for pid in [*each.children().values(), each.process.pid]:
+            try:
+                os.killpg(pid, signal.SIGKILL)
+            except ProcessLookupError:
+                pass
+        each.process.communicate()
