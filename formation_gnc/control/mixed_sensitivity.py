@@ -96,7 +96,7 @@ class Problem:
         """
         if not (self.pole_shift > 0.0 or self.disturbance > 0.0):
             raise DesignError(
-                "orbital motion has poles on the imaginary axis: give a pole_shift or a disturbance above zero"
+                "the plant has poles on the imaginary axis: give a pole_shift or a disturbance above zero"
             )
         if full_information and not self.disturbance > 0.0:
             raise DesignError("the full-information form needs a disturbance above zero to work against")

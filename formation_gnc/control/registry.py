@@ -4,9 +4,11 @@ from formation_gnc.control.coast import Coast
 from formation_gnc.control.controller import Controller
 from formation_gnc.control.hinf import HInfinityController
 from formation_gnc.control.lqr import LinearQuadraticRegulator
+from formation_gnc.control.mpc import ModelPredictiveController
 
 ALGORITHMS: dict[str, type[Controller]] = {
     "coast": Coast,
     "lqr": LinearQuadraticRegulator,
     "hinf": HInfinityController,
+    "mpc": ModelPredictiveController,
 }

@@ -226,21 +226,27 @@ def periodic_gains(models: Sequence[tuple[Matrix, Matrix]], repeats: int, weight
     Raises:
         DesignError: no stabilising periodic solution.
     """
-    stretches = [weights.map(phi, gamma).repeated(repeats) for phi, gamma in models]
-    orbit = reduce(RiccatiMap.then, stretches)
-    cost_to_go = orbit.stabilising()
+    ends = np.roll(periodic_cost_to_go(models, repeats, weights), -1, axis=0)
     gains = np.empty((len(models), 3, len(weights.state)))
-    for index in reversed(range(len(models))):
-        middle = weights.map(*models[index]).repeated((repeats + 1) // 2).backward(cost_to_go)
-        gains[index] = weights.gain(*models[index], middle)
-        cost_to_go = stretches[index].backward(cost_to_go)
     turn = np.eye(len(weights.state))
-    for (phi, gamma), gain in zip(models, gains, strict=True):
-        closed = (phi - gamma @ gain) * np.outer(1.0 / weights.state_unit, weights.state_unit)
+    for index, ((phi, gamma), end) in enumerate(zip(models, ends, strict=True)):
+        middle = weights.map(phi, gamma).repeated((repeats + 1) // 2).backward(end)
+        gains[index] = weights.gain(phi, gamma, middle)
+        closed = (phi - gamma @ gains[index]) * np.outer(1.0 / weights.state_unit, weights.state_unit)
         turn = np.linalg.matrix_power(closed, repeats) @ turn
     if not spectral_radius(turn) < 1.0:
         raise DesignError("the closed loop of these weights is not stable over an orbit")
     return gains
+
+
+def periodic_cost_to_go(models: Sequence[tuple[Matrix, Matrix]], repeats: int, weights: Weights) -> Matrix:
+    """Scaled cost-to-go P (N, n, n) at the start of each of N stretches of an orbit; as `periodic_gains`."""
+    stretches = [weights.map(phi, gamma).repeated(repeats) for phi, gamma in models]
+    result = np.empty((len(models), *weights.state.shape))
+    cost_to_go = reduce(RiccatiMap.then, stretches).stabilising()
+    for index in reversed(range(len(models))):
+        result[index] = cost_to_go = stretches[index].backward(cost_to_go)
+    return result
 
 
 def spectral_radius(matrix: Matrix) -> float:

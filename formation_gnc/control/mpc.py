@@ -1,0 +1,454 @@
+"""Model predictive control."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import osqp
+from scipy import sparse
+
+from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
+from formation_gnc.control.lqr import STRETCHES, LinearQuadraticRegulator, LqrParameters
+from formation_gnc.control.models import DESIGN_MODELS
+from formation_gnc.control.night import Night
+from formation_gnc.control.programme import Programme, facet_normals, facet_reach
+from formation_gnc.control.riccati import Weights, periodic_cost_to_go
+from formation_gnc.errors import DesignError
+from formation_gnc.interface import NANOSECONDS, Estimate, Matrix, Target, Vector
+from formation_gnc.mission import Mission
+from formation_gnc.parameters import parameter
+
+ACCURACY = 1e-4
+"""Residual at which OSQP stops, with force in units of the thrust limit."""
+
+MOST_ITERATIONS = 2000
+"""Iterations after which the answer does not count: some ten milliseconds at 30 steps."""
+
+KEEP_OUT_WEIGHT = 1e4
+"""Cost of a keep-out sphere entered by one position error, over the weight of that error."""
+
+
+@dataclass(frozen=True)
+class MpcParameters:
+    """Plan, weights by Bryson's rule, and limits."""
+
+    model: str = parameter(
+        "hill", choices=tuple(DESIGN_MODELS), in_flight=True, doc="relative motion that the plan is made on"
+    )
+    step: float = parameter(60.0, unit="s", above=0.0, in_flight=True, doc="step of the plan; whole ticks")
+    horizon: int = parameter(
+        30, minimum=1, maximum=500, in_flight=True, doc="steps that the plan looks ahead"
+    )
+    control_horizon: int = parameter(
+        0, minimum=0, maximum=500, in_flight=True, doc="steps with thrust, none after them; 0 for all"
+    )
+    replan_interval: float = parameter(
+        0.0,
+        unit="s",
+        minimum=0.0,
+        in_flight=True,
+        doc="time for which one plan is flown; 0 plans at every tick",
+    )
+    weighting: str = parameter(
+        "running",
+        choices=("running", "terminal"),
+        in_flight=True,
+        doc="running: the error at all times, beyond the horizon as LQR would pay; terminal: only at the "
+        "horizon's end (Kremmydas)",
+    )
+    cost: str = parameter(
+        "quadratic",
+        choices=("quadratic", "absolute"),
+        in_flight=True,
+        doc="cost of thrust; absolute is delta-v",
+    )
+    position_error: tuple[float, ...] = parameter(
+        (1.0, 1.0, 1.0),
+        unit="m",
+        length=3,
+        above=0.0,
+        in_flight=True,
+        doc="position error that weighs one, per Hill axis",
+    )
+    velocity_error: tuple[float, ...] = parameter(
+        (0.01, 0.01, 0.01),
+        unit="m/s",
+        length=3,
+        above=0.0,
+        in_flight=True,
+        doc="velocity error that weighs one, per Hill axis",
+    )
+    thrust: tuple[float, ...] = parameter(
+        (0.01, 0.01, 0.01),
+        unit="N",
+        length=3,
+        above=0.0,
+        in_flight=True,
+        doc="force that weighs one, per Hill axis; over a tick when running, over a step when terminal",
+    )
+    total_thrust: float = parameter(
+        0.0,
+        unit="N",
+        minimum=0.0,
+        in_flight=True,
+        doc="largest magnitude of the force, by a polyhedron inside; 0 for none",
+    )
+    thrust_rate: float = parameter(
+        0.0, unit="N/s", minimum=0.0, in_flight=True, doc="fastest change of the force, per axis; 0 for any"
+    )
+    keep_out_radius: float = parameter(
+        0.0,
+        unit="m",
+        minimum=0.0,
+        in_flight=True,
+        doc="radius of a soft keep-out sphere about the chief; 0 for none",
+    )
+    eclipse: str = parameter(
+        "none",
+        choices=("none", "share", "observed"),
+        in_flight=True,
+        doc="when the plan has no thrust: never; in the last eclipse_share of every orbit from the start of "
+        "the run (Kremmydas); where the shadow was met on the orbit before",
+    )
+    eclipse_share: float = parameter(
+        1.0 / 3.0, above=0.0, maximum=0.9, in_flight=True, doc="share of an orbit without thrust"
+    )
+
+
+class ModelPredictiveController(Controller):
+    """Plans thrust over a horizon by a quadratic programme, within the limits, and flies the plan's first
+    steps.
+
+    Running weights: the discrete LQR's cost per tick over the horizon, then its cost-to-go, so that without
+    active limits the law is that LQR. Terminal weights (Kremmydas 4.3): only the error at the horizon's end
+    counts, against a target carried there; the target's preview is used as far as it reaches on the plan's
+    steps, and free motion from there. With `replan_interval`, one plan is flown for that long (multistep);
+    without, a plan is made at every tick from the one before (receding).
+
+    The states are eliminated: the programme has the forces alone, which was measured to be twice as fast as
+    keeping the states with their sparse equations. A model that varies along the orbit has its programme
+    tabulated every two degrees.
+
+    OSQP's answer counts with the status solved, finite and inside the limits. Otherwise the last plan's step
+    for this time flies, and without one LQR on the same weights; the command says so. Its iterations, not a
+    clock, end the solver and adapt its step, so that equal inputs give equal commands.
+
+    Assumes: separation much smaller than the chief's radius; what the model assumes; a mass near that of the
+    design.
+    """
+
+    Parameters = MpcParameters
+
+    def __init__(self, parameters: MpcParameters, mission: Mission, vehicle: Vehicle) -> None:
+        """Tabulate the programme.
+
+        Raises:
+            DesignError: a step that is not whole ticks, horizons that do not fit one another or the eclipse,
+            or no LQR.
+        """
+        self._parameters = parameters
+        self._tick_ns, self._step_ns = mission.tick_ns, round(parameters.step * NANOSECONDS)
+        if self._step_ns % self._tick_ns:
+            raise DesignError(
+                f"mpc: step is {parameters.step} s; it must be a whole number of ticks of {mission.tick} s"
+            )
+        self._steps = parameters.control_horizon or parameters.horizon
+        if self._steps > parameters.horizon:
+            raise DesignError(
+                f"mpc: control_horizon is {self._steps} steps; it must be at most horizon, {parameters.horizon}"
+            )
+        self._model = DESIGN_MODELS[parameters.model](mission)
+        self._limit, self._mass = vehicle.thrust_limit, vehicle.mass
+        if parameters.total_thrust > 0.0:
+            self._limit = np.minimum(self._limit, parameters.total_thrust)
+        self._unit = float(self._limit.max())
+        self._night = Night(
+            parameters.eclipse, parameters.eclipse_share, self._model.period, mission.chief.semi_major_axis
+        )
+        if self._night.longest >= self._steps * parameters.step:
+            raise DesignError(
+                f"mpc: the horizon with thrust, {self._steps * parameters.step:.0f} s, is not longer "
+                f"than the eclipse, {self._night.longest:.0f} s"
+            )
+        self._reserve = LinearQuadraticRegulator(
+            LqrParameters(
+                model=parameters.model,
+                gain="discrete" if self._model.is_time_invariant else "periodic",
+                position_error=parameters.position_error,
+                velocity_error=parameters.velocity_error,
+                thrust=parameters.thrust,
+            ),
+            mission,
+            vehicle,
+        )
+        self._force = np.zeros(3)
+        self._plan = np.empty((0, 3))
+        self._planned_at = 0
+        self._answer = ""
+        self._constant_bounds: tuple[Vector, Vector] | None = None
+        self._programmes = self._tabulate()
+        self._place = 0
+        self._setup()
+
+    def _tabulate(self) -> list[Programme]:
+        """The programme at each of the places along the orbit."""
+        parameters, tick = self._parameters, self._tick_ns / NANOSECONDS
+        stretches = 1 if self._model.is_time_invariant else STRETCHES
+        error = np.array(parameters.position_error + parameters.velocity_error)
+        state_weight, thrust_weight = np.diag(error**-2.0), np.diag(np.array(parameters.thrust) ** -2.0)
+        grid = self._model.period / stretches * np.arange(stretches)
+        table = [self._model.discretise(float(time), parameters.step) for time in grid]
+        phi, gamma = (np.array(each) for each in zip(*table, strict=True))
+        if parameters.weighting == "terminal":
+            ends, share, running = np.array([state_weight]), 1.0, 0.0 * state_weight
+        else:
+            share = parameters.step / tick
+            running = share * state_weight
+            weights = Weights.scaled(state_weight, self._mass**2 * thrust_weight, tick)
+            ticks = [
+                self._model.discretise(float(time), tick) for time in grid + 0.5 * grid[min(1, stretches - 1)]
+            ]
+            repeats = max(1, round(self._model.period / stretches / tick)) if stretches > 1 else 1
+            ends = periodic_cost_to_go(ticks, repeats, weights)
+            ends *= weights.cost_unit / np.outer(weights.state_unit, weights.state_unit)
+        programmes = []
+        for start in range(stretches):
+            places = (
+                start + parameters.step * np.arange(parameters.horizon + 1) * stretches / self._model.period
+            )
+            below = np.floor(places).astype(int)
+            part = (places - below)[:, None, None]
+            along = [
+                (1.0 - part) * each[below % stretches] + part * each[(below + 1) % stretches]
+                for each in (phi, gamma)
+            ]
+            programmes.append(
+                Programme.condensed(
+                    along[0][:-1],
+                    along[1][:-1] * (self._unit / self._mass),
+                    self._steps,
+                    running,
+                    ends[below[-1] % len(ends)],
+                    share * self._unit**2 * thrust_weight,
+                    parameters.cost,
+                )
+            )
+        return programmes
+
+    def _setup(self) -> None:
+        """Give OSQP the first programme, with the rows of all constraints."""
+        parameters, steps = self._parameters, self._steps
+        count = 3 * steps
+        eye = sparse.eye_array(count)
+        extra = count * (parameters.cost == "absolute") + parameters.horizon * (
+            parameters.keep_out_radius > 0.0
+        )
+        blocks = [[eye, sparse.csc_array((count, extra))]]
+        if parameters.total_thrust > 0.0:
+            facets = sparse.kron(sparse.eye_array(steps), sparse.csc_array(facet_normals()[3:]))
+            blocks.append([facets, sparse.csc_array((facets.shape[0], extra))])
+        if parameters.thrust_rate > 0.0:
+            blocks.append([eye - sparse.eye_array(count, k=-3), sparse.csc_array((count, extra))])
+        if parameters.cost == "absolute":
+            rest = sparse.csc_array((count, extra - count))
+            blocks.append([eye, sparse.hstack([-eye, rest])])
+            blocks.append([eye, sparse.hstack([eye, rest])])
+        if parameters.keep_out_radius > 0.0:
+            rows = np.repeat(np.tri(parameters.horizon, steps), 3, axis=1)
+            beyond = sparse.csc_array((parameters.horizon, extra - parameters.horizon))
+            blocks.append(
+                [sparse.csc_array(2.0 * rows), sparse.hstack([beyond, sparse.eye_array(parameters.horizon)])]
+            )
+        self._rows = sparse.csc_array(sparse.block_array(blocks))
+        self._rows.sort_indices()
+        self._keep_out_entries = np.flatnonzero(self._rows.data == 2.0)
+        column = np.repeat(np.arange(self._rows.shape[1]), np.diff(self._rows.indptr))[self._keep_out_entries]
+        row = self._rows.indices[self._keep_out_entries] - (self._rows.shape[0] - parameters.horizon)
+        self._keep_out_index = row, column
+        self._extra = extra
+        slack = np.zeros(extra)
+        if parameters.keep_out_radius > 0.0:
+            slack[-parameters.horizon :] = KEEP_OUT_WEIGHT * self._programmes[0].scale
+        pattern = sparse.block_diag(
+            [sparse.csc_array(np.triu(np.ones((count, count)))), sparse.diags_array(np.ones(extra))],
+            format="csc",
+        )
+        self._hessian_rest = slack
+        pattern.data = self._hessian(self._programmes[0])
+        size = self._rows.shape[0]
+        self._solver = osqp.OSQP()
+        self._solver.setup(
+            sparse.csc_matrix(pattern),
+            np.zeros(count + extra),
+            sparse.csc_matrix(self._rows),
+            np.full(size, -1.0),
+            np.full(size, 1.0),
+            verbose=False,
+            eps_abs=ACCURACY,
+            eps_rel=ACCURACY,
+            max_iter=MOST_ITERATIONS,
+            check_termination=10,
+            adaptive_rho=1,  # by iterations, not by a clock
+            adaptive_rho_interval=50,
+            polishing=False,
+        )
+
+    def _hessian(self, programme: Programme) -> Vector:
+        return np.concatenate([programme.hessian, self._hessian_rest])
+
+    def take_over(self, handover: Handover) -> None:
+        """Start from the force that flew before; an MPC that flew before hands on what it saw of the
+        shadow."""
+        self._force = handover.force
+        if isinstance(handover.law, ModelPredictiveController):
+            self._night.seen = handover.law._night.seen
+
+    def command(self, estimate: Estimate, target: Target) -> Command:
+        """The plan's force for this tick: from a new plan when one is due, else from the plan in force."""
+        time = estimate.time
+        self._night.watch(time, estimate.eclipse)
+        due = not len(self._plan) or time - self._planned_at >= max(
+            round(self._parameters.replan_interval * NANOSECONDS), 1
+        )
+        command = self._solve(estimate, target) if due else self._follow(time, "")
+        if command is None:
+            command = self._follow(time, f"mpc: {self._answer}; the last plan flies")
+        if command is None:
+            reserve = self._reserve.command(estimate, target).force
+            command = Command(reserve, fallback=f"mpc: {self._answer}; no plan, LQR flies")
+        self._force = np.clip(command.force, -self._limit, self._limit)
+        return Command(
+            command.force * estimate.mass / self._mass,
+            command.solver,
+            command.iterations,
+            command.cost,
+            command.fallback,
+        )
+
+    def _follow(self, time: int, reason: str) -> Command | None:
+        """The step of the plan in force for this time: none when there is no plan or it has ended early."""
+        index = (time - self._planned_at) // self._step_ns
+        if index < len(self._plan):
+            return Command(self._plan[index], fallback=reason)
+        return Command(np.zeros(3)) if len(self._plan) and not reason else None
+
+    def _solve(self, estimate: Estimate, target: Target) -> Command | None:
+        """The first force of a new plan, or None with the reason in `_answer`."""
+        parameters, count = self._parameters, 3 * self._steps
+        programme = self._programme_at(estimate.time)
+        free = programme.free @ estimate.relative_state - self._goal(programme, target).ravel()
+        gradient = np.zeros(count + self._extra)
+        gradient[:count] = programme.gradient @ free
+        if parameters.cost == "absolute":
+            gradient[count : 2 * count] = programme.price
+        lower, upper = self._bounds(estimate.time)
+        rows = {}
+        if parameters.keep_out_radius > 0.0:
+            rows = {"Ax": self._keep_out(programme, estimate, lower)}
+        if not (np.abs(gradient) < 1e20).all():
+            self._answer = "the error is out of any range"
+            return None
+        self._solver.update(q=gradient, l=lower, u=upper, **rows)
+        result = self._solver.solve(raise_error=False)
+        self._answer = result.info.status
+        solution = result.x
+        if result.info.status_val != osqp.SolverStatus.OSQP_SOLVED or not np.isfinite(solution).all():
+            self._solver.warm_start(x=np.zeros(count + self._extra), y=np.zeros(len(lower)))
+            return None
+        box_lower, box_upper = lower[:count], upper[:count]
+        force = np.clip(solution[:count], box_lower, box_upper)
+        if np.abs(force - solution[:count]).max() > 100.0 * ACCURACY:
+            self._answer = f"{result.info.status}, but outside the limits"
+            return None
+        self._plan = (self._unit * force).reshape(-1, 3)
+        # What the solver's accuracy leaves beyond the limits of the force that flies next is cut off.
+        if parameters.thrust_rate > 0.0:
+            change = parameters.thrust_rate * self._tick_ns / NANOSECONDS
+            self._plan[0] = np.clip(self._plan[0], self._force - change, self._force + change)
+        if parameters.total_thrust > 0.0:
+            size = np.linalg.norm(self._plan, axis=1, keepdims=True)
+            self._plan *= np.minimum(1.0, parameters.total_thrust / np.maximum(size, 1e-300))
+        self._planned_at = estimate.time
+        cost = 2.0 * result.info.obj_val / programme.scale + free @ programme.weight_of_free(free)
+        return Command(self._plan[0], result.info.status, int(result.info.iter), float(cost))
+
+    def _programme_at(self, time: int) -> Programme:
+        place = 0
+        if len(self._programmes) > 1:
+            places = time / NANOSECONDS / self._model.period * len(self._programmes)
+            place = round(places) % len(self._programmes)
+        if place != self._place:
+            self._place = place
+            self._solver.update(Px=self._hessian(self._programmes[place]))
+        return self._programmes[place]
+
+    def _goal(self, programme: Programme, target: Target) -> Matrix:
+        """(N, 6) target states at the ends of the steps."""
+        horizon = self._parameters.horizon
+        ahead = (
+            min(len(target.preview), horizon)
+            if abs(target.preview_step - self._parameters.step) < 1e-9
+            else 0
+        )
+        goal = (programme.free @ target.relative_state).reshape(horizon, 6)
+        if ahead:
+            goal[:ahead] = target.preview[:ahead]
+            for step in range(ahead, horizon):
+                goal[step] = programme.steps[step] @ goal[step - 1]
+        return goal
+
+    def _bounds(self, time: int) -> tuple[Vector, Vector]:
+        """Bounds of all rows; those that no time and no force change are made once."""
+        parameters, steps = self._parameters, self._steps
+        constant = (
+            parameters.eclipse == "none" and not parameters.thrust_rate and not parameters.keep_out_radius
+        )
+        if constant and self._constant_bounds is not None:
+            return self._constant_bounds
+        box = np.tile(self._limit / self._unit, steps)
+        box[np.repeat(self._night.dark(time, self._step_ns, steps), 3)] = 0.0
+        facet = np.full(10 * steps, parameters.total_thrust / self._unit / facet_reach())
+        if parameters.total_thrust > 0.0:
+            box = np.minimum(box, facet[0])
+        lower, upper = [-box], [box]
+        if parameters.total_thrust > 0.0:
+            lower.append(-facet)
+            upper.append(facet)
+        if parameters.thrust_rate > 0.0:
+            # A plan that is flown as it is changes at one tick; one that is made anew at every tick changes
+            # at all of them.
+            span = self._tick_ns if parameters.replan_interval > 0.0 else self._step_ns
+            change = np.full(3 * steps, parameters.thrust_rate * span / NANOSECONDS / self._unit)
+            change[:3] = parameters.thrust_rate * self._tick_ns / NANOSECONDS / self._unit
+            middle = np.zeros(3 * steps)
+            middle[:3] = self._force / self._unit
+            lower.append(middle - change)
+            upper.append(middle + change)
+        if parameters.cost == "absolute":
+            lower += [np.full(3 * steps, -np.inf), np.zeros(3 * steps)]
+            upper += [np.zeros(3 * steps), np.full(3 * steps, np.inf)]
+        if parameters.keep_out_radius > 0.0:
+            lower.append(np.zeros(parameters.horizon))
+            upper.append(np.full(parameters.horizon, np.inf))
+        bounds = np.concatenate(lower), np.concatenate(upper)
+        self._constant_bounds = bounds if constant else None
+        return bounds
+
+    def _keep_out(self, programme: Programme, estimate: Estimate, lower: Vector) -> Vector:
+        """Keep to the outside of a plane per step, which touches the sphere where the last plan comes
+        closest.
+
+        Sets the last rows of `lower`, and returns the elements of all rows.
+        """
+        parameters, horizon = self._parameters, self._parameters.horizon
+        unit = np.array(parameters.position_error).min()
+        free = (programme.free @ estimate.relative_state).reshape(horizon, 6)[:, :3]
+        forced = programme.forced.reshape(horizon, 6, -1)[:, :3]
+        planned = np.zeros((self._steps, 3))
+        planned[: len(self._plan)] = self._plan / self._unit
+        path = free + forced @ planned.ravel()
+        distance = np.linalg.norm(path, axis=1, keepdims=True)
+        normal = np.where(distance > 1e-9, path / np.maximum(distance, 1e-9), [0.0, 1.0, 0.0])
+        data: Vector = self._rows.data.copy()
+        data[self._keep_out_entries] = (np.einsum("ki,kij->kj", normal, forced) / unit)[self._keep_out_index]
+        lower[-horizon:] = (parameters.keep_out_radius - np.einsum("ki,ki->k", normal, free)) / unit
+        return data
