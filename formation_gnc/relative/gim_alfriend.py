@@ -2,35 +2,34 @@
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.orbit.constants import EARTH_RADIUS, J2, MU
 from formation_gnc.orbit.elements import Elements, elements_from_state
+from formation_gnc.orbit.frames import hill_transform, hill_transform_inverse
+from formation_gnc.orbit.mean import mean_state, osculating_state, secular_rates
 from formation_gnc.relative.chief import OblateChief
-from formation_gnc.relative.mean_elements import (
-    NodalElements,
-    mean_elements,
-    secular_rates,
-    short_period_jacobian,
-)
 from formation_gnc.relative.model import ON_THE_CHIEF, Array, LinearModel
 from formation_gnc.relative.oblate import OblateModel
 
 LOWEST_INCLINATION = 1e-3
 """Inclination, rad, below which the elements that refer to the node lose too many digits."""
 
+DIFFERENCE = 1e-4
+"""Relative step of the central differences of the short-period perturbations: exact to 1e-10 of them."""
+
 
 @dataclass(frozen=True)
 class GimAlfriendModel(LinearModel):
     """Linear relative motion under J2 about a chief of any eccentricity.
 
-    The state is Sigma(t) times the differences of osculating elements (Joshi (3.50), (3.51)); these are D(t)
-    times those of mean elements, which J2 changes at constant rates: Phi = Sigma D M D^-1 Sigma^-1. D is
-    the Jacobian of the first-order short-period perturbations, here from their generating function. The
-    long-period ones, singular at the critical inclination, are left out, and the chief's own osculating
-    elements are integrated, not taken from the theory: docs/theory/relative-motion.md.
+    The state is Sigma times the differences of elements (Joshi (3.49)-(3.51)). Osculating ones are D times
+    those of mean elements, which J2 changes at constant rates: Phi = Sigma D M D^-1 Sigma^-1. The long-period
+    perturbations, singular at the critical inclination, stay in the mean elements, and the chief's own
+    osculating elements are integrated, not taken from the theory: docs/theory/relative-motion.md.
 
     Assumes: separation much smaller than the radius; no equatorial chief. Its error is of order J2^2.
 
@@ -69,14 +68,10 @@ class GimAlfriendModel(LinearModel):
         return OblateModel(self.chief).dynamics(time)
 
     def transition(self, time: float, duration: float, state: Array = ON_THE_CHIEF) -> Array:
-        """(6, 6) state transition matrix by the theory, to order J2 per revolution."""
-        start, end = self._osculating(time), self._osculating(time + duration)
-        mean = mean_elements(start)
-        phi: Array = (
-            _state_from_mean(end)
-            @ _secular_transition(mean, duration)
-            @ np.linalg.inv(_state_from_mean(start))
-        )
+        """(6, 6) state transition matrix by the theory, to first order in J2."""
+        mean, start = _state_from_mean_elements(self.chief, time)
+        _, end = _state_from_mean_elements(self.chief, time + duration)
+        phi: Array = end @ _secular_transition(mean, duration) @ np.linalg.inv(start)
         return phi
 
     def discretise(self, time: float, tick: float, state: Array = ON_THE_CHIEF) -> tuple[Array, Array]:
@@ -86,26 +81,22 @@ class GimAlfriendModel(LinearModel):
 
     def bounded(self, time: float, state: Array) -> Array:
         """(6,) state whose along-track rate makes the mean latitudes, nodes included, keep their distance."""
-        osculating = self._osculating(time)
-        mean = mean_elements(osculating)
+        mean, matrix = _state_from_mean_elements(self.chief, time)
         slopes = _secular_slopes(mean)
-        drift = slopes[1] + math.cos(mean.inclination) * slopes[5]
-        row = drift @ np.linalg.inv(_state_from_mean(osculating))
+        row = (slopes[1] + math.cos(mean.inclination) * slopes[5]) @ np.linalg.inv(matrix)
         result = np.array(state, dtype=np.float64)
         result[4] -= row @ result / row[4]
         return result
 
-    def _osculating(self, time: float) -> NodalElements:
-        return NodalElements.of(elements_from_state(self.chief.inertial(time)))
 
+def sigma(orbit: Elements) -> Array:
+    """(6, 6) map from differences of elements [a, theta, i, q1, q2, Omega] to the relative state.
 
-def sigma(orbit: NodalElements) -> Array:
-    """(6, 6) map from differences of osculating elements [a, theta, i, q1, q2, Omega] to the relative state.
-
-    Joshi's Sigma(t) in (3.50), after Gim and Alfriend's geometry; theta is the true argument of latitude.
-    Free of J2, since the relative velocity leaves out the tilt of the plane (`formation_gnc.orbit.frames`).
+    Joshi's Sigma(t) in (3.49), (3.50), after Gim and Alfriend's geometry, with q1 = e cos(omega),
+    q2 = e sin(omega) and theta the true argument of latitude. Free of J2, since the relative velocity leaves
+    out the tilt of the plane (`formation_gnc.orbit.frames`).
     """
-    theta, q1, q2 = orbit.latitude, orbit.q1, orbit.q2
+    theta, q1, q2 = _latitude(orbit)
     sine, cosine = math.sin(theta), math.cos(theta)
     sin_i, cos_i = math.sin(orbit.inclination), math.cos(orbit.inclination)
     parameter = orbit.semi_major_axis * (1.0 - q1**2 - q2**2)
@@ -135,43 +126,74 @@ def sigma(orbit: NodalElements) -> Array:
     )
 
 
-def _state_from_mean(osculating: NodalElements) -> Array:
-    """(6, 6) map from differences of mean elements to the relative state: Sigma D."""
-    by_mean_latitude, by_q1, by_q2 = osculating.latitude_slopes
-    to_true = np.eye(6)
-    to_true[1, [1, 3, 4]] = by_mean_latitude, by_q1, by_q2
-    short = np.eye(6) + short_period_jacobian(mean_elements(osculating))
-    result: Array = sigma(osculating) @ to_true @ short
-    return result
+def _latitude(orbit: Elements) -> tuple[float, float, float]:
+    """True argument of latitude theta, q1 and q2."""
+    e, omega = orbit.eccentricity, orbit.argument_of_perigee
+    return omega + orbit.true_anomaly, e * math.cos(omega), e * math.sin(omega)
 
 
-def _secular_slopes(mean: NodalElements) -> Array:
-    """(6, 6) derivatives of the secular rates of [a, lambda, i, omega, -, Omega] by the mean elements."""
-    a, q1, q2, i = mean.semi_major_axis, mean.q1, mean.q2, mean.inclination
+def _true_from_mean_latitude(orbit: Elements) -> Array:
+    """(6, 6) map from differences with the mean argument of latitude lambda to those with the true one."""
+    theta, q1, q2 = _latitude(orbit)
+    sine, cosine = math.sin(theta), math.cos(theta)
     eta = math.sqrt(1.0 - q1**2 - q2**2)
-    n, s, cosine = math.sqrt(MU / a**3), math.sin(i) ** 2, math.cos(i)
-    e2 = 1.5 * J2 * (EARTH_RADIUS / (a * eta**2)) ** 2 * n
+    e_cosine, e_sine = q1 * cosine + q2 * sine, q1 * sine - q2 * cosine
+    kappa = (1.0 + eta + eta**2) / (1.0 + eta)
+    by_q1 = (2.0 + e_cosine) * (sine - e_sine * q1 / (1.0 + eta)) + kappa * q2
+    by_q2 = -(2.0 + e_cosine) * (cosine + e_sine * q2 / (1.0 + eta)) - kappa * q1
+    matrix = np.eye(6)
+    matrix[1, [1, 3, 4]] = np.array([(1.0 + e_cosine) ** 2, by_q1, by_q2]) / eta**3
+    return matrix
+
+
+@lru_cache(maxsize=64)
+def _state_from_mean_elements(chief: OblateChief, time: float) -> tuple[Elements, Array]:
+    """Mean elements, and the map Sigma D (6, 6) from differences [a, lambda, i, q1, q2, Omega] of them."""
+    osculating = chief.inertial(time)
+    mean = mean_state(osculating)
+    size, speed = math.sqrt(mean[:3] @ mean[:3]), math.sqrt(mean[3:] @ mean[3:])
+    steps = DIFFERENCE * np.repeat([size, speed], 3)
+    short = np.empty((6, 6))  # derivative of what the short-period perturbations add to an inertial state
+    for column, step in enumerate(np.diag(steps)):
+        ahead, behind = mean + step, mean - step
+        added = (osculating_state(ahead) - ahead) - (osculating_state(behind) - behind)
+        short[:, column] = added / (2.0 * steps[column])
+    elements = elements_from_state(mean)
+    of_mean = hill_transform_inverse(mean) @ sigma(elements) @ _true_from_mean_latitude(elements)
+    matrix = hill_transform(osculating) @ (np.eye(6) + short) @ of_mean
+    matrix.setflags(write=False)
+    return elements, matrix
+
+
+def _secular_slopes(mean: Elements) -> Array:
+    """(6, 6) derivatives of the secular rates of [a, lambda, i, omega, -, Omega] by the mean elements."""
+    a, i = mean.semi_major_axis, mean.inclination
+    _, q1, q2 = _latitude(mean)
+    eta = math.sqrt(1.0 - q1**2 - q2**2)
+    n, s, cosine = mean.mean_motion, math.sin(i) ** 2, math.cos(i)
+    rate = 1.5 * J2 * (EARTH_RADIUS / (a * eta**2)) ** 2 * n
     perigee, anomaly = 2.0 - 2.5 * s, 1.0 - 1.5 * s
     by_s = 2.0 * math.sin(i) * cosine
     slopes = np.zeros((6, 6))
-    slopes[3, 0] = -3.5 * e2 / a * perigee
-    slopes[3, 2] = -2.5 * e2 * by_s
-    slopes[5, 0] = 3.5 * e2 / a * cosine
-    slopes[5, 2] = e2 * math.sin(i)
-    slopes[1, 0] = -1.5 * n / a - 3.5 * e2 / a * (perigee + eta * anomaly)
-    slopes[1, 2] = -(2.5 + 1.5 * eta) * e2 * by_s
+    slopes[3, 0] = -3.5 * rate / a * perigee
+    slopes[3, 2] = -2.5 * rate * by_s
+    slopes[5, 0] = 3.5 * rate / a * cosine
+    slopes[5, 2] = rate * math.sin(i)
+    slopes[1, 0] = -1.5 * n / a - 3.5 * rate / a * (perigee + eta * anomaly)
+    slopes[1, 2] = -(2.5 + 1.5 * eta) * rate * by_s
     for column, q in ((3, q1), (4, q2)):
-        slopes[3, column] = 4.0 * e2 * q / eta**2 * perigee
-        slopes[5, column] = -4.0 * e2 * q / eta**2 * cosine
-        slopes[1, column] = slopes[3, column] + 3.0 * e2 * q / eta * anomaly
+        slopes[3, column] = 4.0 * rate * q / eta**2 * perigee
+        slopes[5, column] = -4.0 * rate * q / eta**2 * cosine
+        slopes[1, column] = slopes[3, column] + 3.0 * rate * q / eta * anomaly
     return slopes
 
 
-def _secular_transition(mean: NodalElements, duration: float) -> Array:
+def _secular_transition(mean: Elements, duration: float) -> Array:
     """(6, 6) transition matrix of differences of mean elements."""
+    _, q1, q2 = _latitude(mean)
     turn = secular_rates(mean)[1] * duration
     rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
-    q1, q2 = rotation @ [mean.q1, mean.q2]
+    q1, q2 = rotation @ [q1, q2]
     slopes = _secular_slopes(mean) * duration
     transition = np.eye(6)
     transition[[1, 5]] += slopes[[1, 5]]

@@ -7,10 +7,10 @@ import numpy as np
 
 from formation_gnc.orbit.constants import EARTH_RADIUS, J2, MU
 from formation_gnc.orbit.elements import elements_from_state
-from formation_gnc.orbit.frames import inertial_from_relative
+from formation_gnc.orbit.frames import hill_rate, inertial_from_relative
+from formation_gnc.orbit.mean import mean_state, secular_rates
 from formation_gnc.relative.chief import Chief, ChiefState, OblateChief
 from formation_gnc.relative.factorisation import sdc1_oblate
-from formation_gnc.relative.mean_elements import NodalElements, mean_elements, secular_rates
 from formation_gnc.relative.model import INPUT, NO_THRUST, ON_THE_CHIEF, Array, RelativeModel
 from formation_gnc.relative.nonlinear import jacobian
 
@@ -63,18 +63,18 @@ class OblateModel(RelativeModel):
         if not isinstance(self.chief, OblateChief):
             return super().bounded(time, state)
         inertial = self.chief.inertial(time)
-        here = mean_elements(NodalElements.of(elements_from_state(inertial)))
-        latitude_rate, _, node_rate = secular_rates(here)
-        cosine, radius = math.cos(here.inclination), self.chief.at(time).radius
-        speed = radius * self.chief.at(time).angular_rate
-        slope = -3.0 * speed / math.sqrt(MU * here.semi_major_axis)  # of n by vy: -3 n a v / mu
+        here = elements_from_state(mean_state(inertial))
+        node_rate, *rates = secular_rates(here)
+        transverse = hill_rate(inertial) * math.sqrt(inertial[:3] @ inertial[:3])
+        slope = -3.0 * transverse / math.sqrt(MU * here.semi_major_axis)  # of n by vy: -3 n a v / mu
         result = np.array(state, dtype=np.float64)
-        for _ in range(50):  # the slope is that without J2: each round gains two digits or more
-            deputy = elements_from_state(inertial_from_relative(inertial, result))
-            latitude, _, node = secular_rates(mean_elements(NodalElements.of(deputy)))
-            change = -(latitude - latitude_rate + cosine * (node - node_rate)) / slope
+        for _ in range(50):  # the slope is that without J2: each round gains digits
+            deputy = elements_from_state(mean_state(inertial_from_relative(inertial, result)))
+            node, *others = secular_rates(deputy)
+            excess = sum(others) - sum(rates) + math.cos(here.inclination) * (node - node_rate)
+            change = -excess / slope
             result[4] += change
-            if abs(change) < 1e-13:
+            if abs(change) < 1e-12:
                 break
         return result
 

@@ -9,18 +9,11 @@ from hypothesis import strategies as st
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.orbit.constants import EARTH_RADIUS, J2
-from formation_gnc.orbit.elements import Elements, elements_from_state, state_from_elements
+from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import hill_transform, hill_transform_inverse, relative_from_inertial
 from formation_gnc.orbit.propagation import advance_with_transition
 from formation_gnc.relative.chief import KeplerChief
 from formation_gnc.relative.gim_alfriend import GimAlfriendModel, sigma
-from formation_gnc.relative.mean_elements import (
-    NodalElements,
-    mean_elements,
-    osculating_elements,
-    secular_rates,
-    short_period_jacobian,
-)
 from formation_gnc.relative.model import RelativeModel
 from formation_gnc.relative.oblate import OblateModel
 from formation_gnc.relative.tschauner_hempel import TschaunerHempelModel
@@ -48,65 +41,26 @@ def inertial_of(values):
 
 
 @given(orbits)
-def test_true_latitude_is_that_of_keplers_equation(elements):
-    latitude = NodalElements.of(elements).latitude
-    difference = latitude - elements.argument_of_perigee - elements.true_anomaly
-    assert math.remainder(difference, math.tau) == pytest.approx(0.0, abs=1e-13)
-
-
-@given(orbits)
 def test_sigma_is_the_derivative_of_the_relative_state(elements):
-    orbit = NodalElements.of(elements)
-    values = orbit.array
-    values[1] = orbit.latitude
+    e, omega = elements.eccentricity, elements.argument_of_perigee
+    values = np.array(
+        [
+            elements.semi_major_axis,
+            omega + elements.true_anomaly,
+            elements.inclination,
+            e * math.cos(omega),
+            e * math.sin(omega),
+            elements.right_ascension,
+        ]
+    )
     chief = inertial_of(values)
-    for column, step in zip(sigma(orbit).T, np.diag([10.0, *[1e-6] * 5]), strict=True):
+    for column, step in zip(sigma(elements).T, np.diag([10.0, *[1e-6] * 5]), strict=True):
         ahead, behind = (relative_from_inertial(chief, inertial_of(values + sign * step)) for sign in (1, -1))
         difference = (ahead - behind) / (2.0 * np.linalg.norm(step))
         size = 1.0 if step[0] else elements.semi_major_axis
         # Rounding of the inertial states over the step, and the step squared.
         np.testing.assert_allclose(difference[:3], column[:3], atol=1e-8 * size)
         np.testing.assert_allclose(difference[3:], column[3:], atol=1e-7 * size * elements.mean_motion)
-
-
-@given(orbits)
-def test_short_period_jacobian_is_the_derivative(elements):
-    mean = NodalElements.of(elements)
-    scale = np.array([mean.semi_major_axis, 1.0, 1.0, 1.0, 1.0, 1.0])
-
-    def short(values):
-        orbit = NodalElements(*values)
-        return (osculating_elements(orbit).array - values) / scale
-
-    differences = [(short(mean.array + d) - short(mean.array - d)) / 2e-5 for d in np.diag(1e-5 * scale)]
-    expected = short_period_jacobian(mean) * scale / scale[:, None]
-    np.testing.assert_allclose(np.array(differences).T, expected, atol=1e-9)
-
-
-@settings(max_examples=20, deadline=None)
-@given(orbits)
-def test_mean_elements_are_steady_to_second_order(elements):
-    model = GimAlfriendModel(elements)
-    times = np.linspace(0.0, 2.0 * model.period, 12)
-    osculating = [NodalElements.of(elements_from_state(model.chief.inertial(float(t)))) for t in times]
-    mean = np.array([mean_elements(orbit).array for orbit in osculating])
-    rates = secular_rates(mean_elements(osculating[0]))
-    strength = J2 * (EARTH_RADIUS / elements.perigee_radius) ** 2
-    angle = (mean[:, 1] - mean[0, 1] - rates[0] * times + math.pi) % math.tau - math.pi
-    node = (mean[:, 5] - mean[0, 5] - rates[2] * times + math.pi) % math.tau - math.pi
-    # Osculating elements swing by about 3 J2 (Re/rp)^2; what is left is of the order of its square.
-    for left in (np.ptp(mean[:, 0]) / elements.semi_major_axis, np.ptp(mean[:, 2])):
-        assert left < 15.0 * strength**2
-    for left in (np.ptp(angle), np.ptp(node)):  # second-order secular rates are not in the theory
-        assert left < 30.0 * strength**2 * (1.0 + elements.mean_motion * times[-1])
-
-
-@given(orbits)
-def test_mean_and_osculating_elements_are_inverse(elements):
-    orbit = NodalElements.of(elements)
-    scale = np.array([orbit.semi_major_axis, 1.0, 1.0, 1.0, 1.0, 1.0])
-    back = osculating_elements(mean_elements(orbit)).array
-    np.testing.assert_allclose(back / scale, orbit.array / scale, atol=1e-14)
 
 
 @settings(max_examples=15, deadline=None)
