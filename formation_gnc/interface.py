@@ -31,6 +31,30 @@ class EstimateStatus(IntEnum):
 
     TRACKING = 0
     ACQUIRED = 1
+    COASTING = 2
+    DIVERGED = 3
+    CHIEF_LOST = 4
+
+
+class Refusal(IntEnum):
+    """Why something of a measurement was not used; the places in `Estimate.refusals`, constants of Estimate.msg."""
+
+    NOT_FINITE = 0
+    GATE = 1
+    FUTURE = 2
+    LATE = 3
+    DUPLICATE = 4
+    UNKNOWN_SENSOR = 5
+    NO_DIRECTION = 6
+    OUT_OF_ORDER = 7
+    WRONG_DEPUTY = 8
+    CHIEF = 9
+    AVIONICS = 10
+    FIX = 11
+
+
+Counts = NDArray[np.uint32]
+"""A number for every `Refusal`."""
 
 
 @dataclass(slots=True)
@@ -47,6 +71,7 @@ class Measurement:
     eclipse: bool
     fix_available: bool
     fix: Vector  # (6,)
+    deputy: str = ""
 
 
 @dataclass(slots=True)
@@ -64,6 +89,9 @@ class Estimate:
     innovation_sigma: list[float]
     nis: float
     status: int
+    refusals: Counts = field(default_factory=lambda: np.zeros(len(Refusal), dtype=np.uint32))  # (12,)
+    blind_direction: Vector = field(default_factory=lambda: np.zeros(6))  # (6,)
+    blind: str = ""
 
 
 @dataclass(slots=True)
