@@ -4,20 +4,28 @@ import argparse
 import signal
 import sys
 from collections.abc import Sequence
-
+from typing import NoReturn
 
 from formation_gnc import __version__
 from formation_gnc.commands import COMMANDS
 from formation_gnc.errors import ConfigurationError
 
 
+class _Parser(argparse.ArgumentParser):
+    """Says in one line what is wrong, as for everything else that is not allowed."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: {message}; see `{self.prog} --help`\n")
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a subcommand.
 
     Returns:
-        0 when it did what it was asked, 1 when a run failed, 2 when what it was given is not allowed, 130 when interrupted.
+        0 when it did what it was asked, 1 when a run failed, 2 when what it was given is not allowed, 130
+        when interrupted.
     """
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="formation-gnc",
         description="Fly satellites in formation in software-in-the-loop, and look at what they did.",
         epilog="`formation-gnc COMMAND --help` says more of each command.",
@@ -27,7 +35,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for name, command in COMMANDS.items():
         doc = (command.__doc__ or "").strip()
         subparser = commands.add_parser(
-            name, help=doc.splitlines()[0].rstrip("."), description=doc, formatter_class=argparse.RawDescriptionHelpFormatter
+            name,
+            help=doc.splitlines()[0].rstrip("."),
+            description=doc,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
         )
         command.add_arguments(subparser)
         subparser.set_defaults(run=command.run)
@@ -37,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return int(options.run(options))
     except ConfigurationError as error:
-        print(f"formation-gnc: {error}", file=sys.stderr)
+        print(f"formation-gnc: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
     except BrokenPipeError:
         return 1

@@ -8,12 +8,15 @@ from formation_gnc.interface import NANOSECONDS
 from formation_gnc.orbit.constants import MU
 from formation_gnc.parameters import parameter
 
+LAST_SECOND = 2**31 - 1
+"""Largest time (s) that a message's stamp can carry."""
+
 
 @dataclass(frozen=True)
 class Orbit:
     """The chief's osculating elements at the start of the run."""
 
-    semi_major_axis: float = parameter(unit="m", above=0.0, doc="semi-major axis")
+    semi_major_axis: float = parameter(unit="m", above=0.0, maximum=1e9, doc="semi-major axis")
     eccentricity: float = parameter(0.0, minimum=0.0, maximum=0.99, doc="eccentricity")
     inclination: float = parameter(0.0, unit="rad", minimum=0.0, maximum=3.141592653589793, doc="inclination")
     right_ascension: float = parameter(0.0, unit="rad", doc="right ascension of the ascending node")
@@ -26,7 +29,9 @@ class Mission:
     """Base of every node's schema; in a scenario file it stands once, under ``/**``."""
 
     chief: Orbit
-    tick: float = parameter(1.0, unit="s", above=0.0, doc="time between ticks; a whole number of nanoseconds")
+    tick: float = parameter(
+        1.0, unit="s", above=0.0, maximum=LAST_SECOND, doc="time between ticks; a whole number of nanoseconds"
+    )
 
     def __post_init__(self) -> None:
         """Raise ConfigurationError for a tick that nanosecond stamps cannot carry exactly."""

@@ -9,11 +9,28 @@ are the prefix: ``deputy1.mass``.
 import dataclasses
 import difflib
 import math
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass
 from typing import Any, get_args, get_origin, get_type_hints
 
+import yaml
+
 from formation_gnc.errors import ConfigurationError
+
+
+class _Loader(yaml.SafeLoader):
+    """Reads numbers such as 1e-6, which YAML 1.1 takes for text, as ROS reads them."""
+
+
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float", re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$"), list("-+.0123456789")
+)
+
+
+def read_yaml(text: str) -> Any:
+    """Contents of a YAML document of parameters; raises yaml.YAMLError when it is none."""
+    return yaml.load(text, Loader=_Loader)
 
 
 @dataclass(frozen=True)
@@ -76,7 +93,7 @@ class Leaf:
         """Return `value` in the parameter's own type, or raise ConfigurationError saying what is allowed."""
         if get_origin(self.type) is not tuple:
             return self._check_scalar(value, self.type)
-        if isinstance(value, str) or not hasattr(value, "__iter__"):
+        if not _is_list(value):
             raise self._refusal(value, f"a list ({self.type_name})")
         values = tuple(self._check_scalar(item, get_args(self.type)[0]) for item in value)
         if self.limits.length is not None and len(values) != self.limits.length:
@@ -84,6 +101,8 @@ class Leaf:
         return values
 
     def _check_scalar(self, value: Any, kind: type) -> Any:
+        if isinstance(value, int) and not -(2**63) <= value < 2**63:
+            raise self._refusal(value, "within 64 bits, as ROS carries it")
         if kind is float and isinstance(value, int) and not isinstance(value, bool):
             value = float(value)
         if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
@@ -101,13 +120,17 @@ class Leaf:
         return ConfigurationError(f"parameter {self.name}: {value!r} is not allowed; it must be {allowed}")
 
 
+def _is_list(value: Any) -> bool:
+    return isinstance(value, Sequence) and not isinstance(value, str | bytes)
+
+
 def leaves(
     schema: type, values: Mapping[str, Any], prefix: str = "", defaults: Any = MISSING
 ) -> Iterator[Leaf]:
     """Every parameter of a schema, in order.
 
-    `values` (dotted names) tells which names `per_name` has; the fields of the instance `defaults` go before the
-    schema's own defaults, so that two nested schemas of one kind may have different ones.
+    `values` (dotted names) tells which names `per_name` has; the fields of the instance `defaults` go before
+    the schema's own defaults, so that two nested schemas of one kind may have different ones.
     """
     hints = get_type_hints(schema)
     for field in dataclasses.fields(schema):
@@ -115,7 +138,7 @@ def leaves(
         if "names" in field.metadata:
             source = field.metadata["names"]
             listed = values.get(prefix + source, schema.__dataclass_fields__[source].default)
-            for key in listed if isinstance(listed, list | tuple) else ():
+            for key in listed if _is_list(listed) else ():
                 yield from leaves(get_args(kind)[1], values, f"{prefix}{key}.")
             continue
         default = field.default if defaults is MISSING else getattr(defaults, field.name)
@@ -187,6 +210,8 @@ def change[T](instance: T, changes: Mapping[str, Any]) -> T:
     """
     values = dump(instance)
     for leaf in leaves(type(instance), values):
-        if leaf.name in changes and not leaf.limits.in_flight and changes[leaf.name] != values[leaf.name]:
+        if leaf.name not in changes or leaf.limits.in_flight:
+            continue
+        if leaf.check(changes[leaf.name]) != values[leaf.name]:
             raise ConfigurationError(f"parameter {leaf.name}: cannot change in flight; set it at the start")
     return load(type(instance), values | dict(changes))

@@ -1,6 +1,7 @@
 """A part of a satellite's software whose parameters change in flight, at a tick."""
 
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -10,7 +11,7 @@ import yaml
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.interface import NANOSECONDS, Event
 from formation_gnc.mission import Mission
-from formation_gnc.parameters import change, dump, parameter
+from formation_gnc.parameters import change, dump, parameter, read_yaml
 
 
 @dataclass(frozen=True)
@@ -18,7 +19,9 @@ class Schedulable(Mission):
     """Parameters of a part, and changes of them foreseen for given times."""
 
     schedule: tuple[str, ...] = parameter(
-        (), doc="changes in flight, each `{at: SECONDS, PARAMETER: VALUE, ...}`, taking effect at the first tick from then on"
+        (),
+        doc="changes in flight, each `{at: SECONDS, PARAMETER: VALUE, ...}`, taking effect at the first tick "
+        "from then on",
     )
 
 
@@ -34,8 +37,8 @@ class Configuration[P, D]:
 class Part[P: Schedulable, D](ABC):
     """Navigation, guidance or control of one deputy: parameters, what is designed from them, and swaps.
 
-    A change goes in two steps. `prepare` checks it and designs, which may be slow, touches nothing and may run in another
-    thread; `adopt` hands the result over, and it takes effect when the next tick begins.
+    A change goes in two steps. `prepare` checks it and designs, which may be slow, touches nothing and may
+    run in another thread; `adopt` hands the result over, and it takes effect when the next tick begins.
     """
 
     def __init__(self, name: str, parameters: P) -> None:
@@ -46,16 +49,18 @@ class Part[P: Schedulable, D](ABC):
         """
         self.name = name
         self.events: list[Event] = []
-        self._start(parameters)
+        self._given, self._changes = parameters, dict[str, Any]()
+        self._adopted = deque[Configuration[P, D]]()
+        self._start()
 
-    def _start(self, parameters: P) -> None:
+    def _start(self) -> None:
+        parameters = change(self._given, self._changes)
         self._time = 0
         self.configuration: Configuration[P, D] = Configuration(parameters, self.design(parameters), {})
-        self._pending: Configuration[P, D] | None = None
         self._foreseen: list[tuple[int, Configuration[P, D]]] = []
         latest = self.configuration
         for at, changes in sorted(map(_scheduled, parameters.schedule), key=lambda entry: entry[0]):
-            latest = self.prepare(changes, base=latest)
+            latest = self._design_from(latest.parameters, changes)
             self._foreseen.append((at, latest))
 
     @abstractmethod
@@ -70,47 +75,60 @@ class Part[P: Schedulable, D](ABC):
         """The parameters in force."""
         return self.configuration.parameters
 
-    def prepare(
-        self, changes: Mapping[str, Any], base: Configuration[P, D] | None = None
-    ) -> Configuration[P, D]:
+    def prepare(self, changes: Mapping[str, Any]) -> Configuration[P, D]:
         """Check a change of parameters and design from it, without effect yet.
 
         Raises:
             ConfigurationError: the change is not allowed, or the design fails; nothing has changed.
         """
-        if "schedule" in changes:
-            raise ConfigurationError("parameter schedule: cannot change in flight; set it at the start")
-        parameters = change((base or self._pending or self.configuration).parameters, changes)
-        return Configuration(parameters, self.design(parameters), dict(changes))
+        waiting = tuple(self._adopted)
+        return self._design_from(self.parameters, {**waiting[-1].changes, **changes} if waiting else changes)
+
+    def _design_from(self, parameters: P, changes: Mapping[str, Any]) -> Configuration[P, D]:
+        changed = change(parameters, changes)
+        return Configuration(changed, self.design(changed), dict(changes))
 
     def adopt(self, prepared: Configuration[P, D]) -> None:
         """Let a prepared configuration take over when the next tick begins."""
-        self._pending = prepared
+        self._adopted.append(prepared)
 
     def begin_tick(self, time: int) -> None:
         """Let a change take over that is due at this tick: first a scheduled one, then an adopted one.
 
-        Time that runs backwards is a new run: the schedule starts again, and so does what was designed.
+        Time that runs backwards is a new run: what the schedule has changed is as it was at the start, what
+        was adopted stays.
         """
         if time < self._time:
-            self._start(self.parameters)
+            self._start()
         self._time = time
         while self._foreseen and self._foreseen[0][0] <= time:
-            _, due = self._foreseen.pop(0)
-            # What was designed beforehand holds only if nothing else was changed in the meantime.
-            self._swap(time, due if self._follows(due) else self.prepare(due.changes, base=self.configuration))
-        if self._pending is not None:
-            pending, self._pending = self._pending, None
-            self._swap(time, pending)
+            self._let_take_over(time, self._foreseen.pop(0)[1])
+        while self._adopted:
+            adopted = self._adopted.popleft()
+            if self._let_take_over(time, adopted):
+                self._changes |= adopted.changes
 
-    def _follows(self, due: Configuration[P, D]) -> bool:
-        return change(self.parameters, due.changes) == due.parameters
+    def _let_take_over(self, time: int, due: Configuration[P, D]) -> bool:
+        """Swap, if that is still allowed."""
+        try:
+            # What was designed beforehand holds only if nothing else has changed since.
+            if change(self.parameters, due.changes) != due.parameters:
+                due = self._design_from(self.parameters, due.changes)
+        except (
+            ConfigurationError
+        ) as refusal:  # only now, together with what was changed since it was prepared
+            self.record(time, "refused", str(refusal))
+            return False
+        self._swap(time, due)
+        return True
 
     def _swap(self, time: int, new: Configuration[P, D]) -> None:
         old, self.configuration = self.configuration, new
         self.take_over(old, new)
         before = dump(old.parameters)
-        detail = ", ".join(f"{name}: {_text(before[name])} -> {_text(value)}" for name, value in new.changes.items())
+        detail = ", ".join(
+            f"{name}: {_text(before[name])} -> {_text(value)}" for name, value in new.changes.items()
+        )
         self.record(time, "parameters", detail)
 
     def record(self, time: int, kind: str, detail: str) -> None:
@@ -125,10 +143,10 @@ class Part[P: Schedulable, D](ABC):
 
 def _scheduled(entry: str) -> tuple[int, dict[str, Any]]:
     try:
-        changes = yaml.safe_load(entry)
-        at = changes.pop("at")
-        return round(float(at) * NANOSECONDS), changes
-    except (yaml.YAMLError, AttributeError, KeyError, TypeError, ValueError):
+        changes = read_yaml(entry)
+        at = round(float(changes.pop("at")) * NANOSECONDS)
+        return at, {str(name): value for name, value in changes.items()}
+    except (yaml.YAMLError, AttributeError, KeyError, TypeError, ValueError, OverflowError):
         raise ConfigurationError(
             f"parameter schedule: {entry!r} is not allowed; "
             "it must be like '{at: 3000.0, algorithm: coast}' with the time in seconds"
@@ -137,5 +155,3 @@ def _scheduled(entry: str) -> tuple[int, dict[str, Any]]:
 
 def _text(value: Any) -> str:
     return str(list(value)) if isinstance(value, tuple) else str(value)
-
-

@@ -26,16 +26,25 @@ from formation_gnc.sil.scenario import Scenario, duration_of, load_scenario
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     parser.add_argument("scenario", help="name of a scenario in params/, or a ROS 2 parameter file")
-    parser.add_argument("--controller", metavar="NAME", help=f"control law of every deputy: {', '.join(ALGORITHMS)}")
+    parser.add_argument(
+        "--controller", metavar="NAME", help=f"control law of every deputy: {', '.join(ALGORITHMS)}"
+    )
     length = parser.add_mutually_exclusive_group()
     length.add_argument("--duration", metavar="S", type=float, help="simulated seconds to fly")
     length.add_argument("--orbits", metavar="N", type=float, help="orbits of the chief to fly")
     parser.add_argument("--seed", metavar="N", type=int, help="seed of every random number of the run")
     parser.add_argument(
-        "--real-time-factor", metavar="X", type=float, help="simulated seconds per wall second at most; 0: no limit"
+        "--real-time-factor",
+        metavar="X",
+        type=float,
+        help="simulated seconds per wall second at most; 0: no limit",
     )
-    parser.add_argument("--in-process", action="store_true", help="fly in this process, without the node graph")
-    parser.add_argument("--bag", metavar="DIR", type=Path, help="directory to make for the bag (default: bags/SCENARIO_DATE)")
+    parser.add_argument(
+        "--in-process", action="store_true", help="fly in this process, without the node graph"
+    )
+    parser.add_argument(
+        "--bag", metavar="DIR", type=Path, help="directory to make for the bag (default: bags/SCENARIO_DATE)"
+    )
     parser.add_argument("--json", action="store_true", help="print the figures as one JSON object")
 
 
@@ -61,7 +70,7 @@ def run(options: argparse.Namespace) -> int:
 def _scenario(options: argparse.Namespace) -> Scenario:
     given = {"seed": options.seed, "duration": options.duration, "real_time_factor": options.real_time_factor}
     plant = {name: value for name, value in given.items() if value is not None}
-    controller = {"algorithm": options.controller} if options.controller else {}
+    controller = {"algorithm": options.controller} if options.controller is not None else {}
     overrides: dict[str, dict[str, Any]] = {"/plant": plant, "/**/controller": controller}
     scenario = load_scenario(options.scenario, overrides)
     if options.orbits is not None:
@@ -138,12 +147,17 @@ def _fly_in_process(scenario: Scenario, bag: Path, console: Console) -> float:
     run = Run(scenario)
     tick, pace = scenario.plant.tick, scenario.plant.real_time_factor
     if pace:
-        raise ConfigurationError("real_time_factor: has no effect in-process; fly the node graph for a paced run")
+        raise ConfigurationError(
+            "real_time_factor: has no effect in-process; fly the node graph for a paced run"
+        )
     parameters = {
         f"parameters {node}": {name: json.dumps(value) for name, value in values.items()}
         for node, values in scenario.parameters().items()
     }
-    with BagWriter(bag, provenance() | parameters) as writer, _Display(console, scenario.plant.ticks) as display:
+    with (
+        BagWriter(bag, provenance() | parameters) as writer,
+        _Display(console, scenario.plant.ticks) as display,
+    ):
         sink = InProcessRecorder(writer)
         started = perf_counter()
         while not run.plant.finished:
@@ -185,7 +199,9 @@ def _summarise(scenario: Scenario, bag: Path, speedup: float, as_json: bool) -> 
         "RMS position error [m]": [f"{each.rms_error_m:.3f}" for each in deputies],
         "RMS estimation error [m]": [f"{each.estimate_rms_m:.3f}" for each in deputies],
         "mean NIS [-]": [f"{each.mean_nis:.3f}" for each in deputies],
-        "delta-v x, y, z [mm/s]": [", ".join(f"{1e3 * axis:.2f}" for axis in each.delta_v_axes_m_s) for each in deputies],
+        "delta-v x, y, z [mm/s]": [
+            ", ".join(f"{1e3 * axis:.2f}" for axis in each.delta_v_axes_m_s) for each in deputies
+        ],
         "delta-v total [mm/s]": [f"{1e3 * each.delta_v_m_s:.2f}" for each in deputies],
     }
     for label, values in rows.items():

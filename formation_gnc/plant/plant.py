@@ -7,7 +7,8 @@ import numpy as np
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.interface import NANOSECONDS, Measurement, SatelliteTruth, Truth, Vector
-from formation_gnc.mission import Mission
+from formation_gnc.mission import LAST_SECOND, Mission
+from formation_gnc.orbit.constants import EARTH_RADIUS
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import hill_rotation, inertial_from_relative, relative_from_inertial
 from formation_gnc.orbit.propagation import Propagator
@@ -16,7 +17,7 @@ from formation_gnc.plant.sensors import Sensors, SensorSuite
 from formation_gnc.randomness import generator
 
 LONGEST_STEP = 10.0
-"""Integration step (s) above which a tick is divided: of order eight, it keeps an orbit in LEO well below 1 mm."""
+"""Integration step (s) above which a tick is divided: of order eight, it keeps an orbit in LEO below 1 mm."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,11 @@ class DeputyParameters:
     """One deputy: where it starts, what it weighs, how it pushes and what it sees."""
 
     relative_state: tuple[float, ...] = parameter(
-        unit="m, m/s", length=6, doc="true state at the start relative to the chief, Hill frame"
+        unit="m, m/s",
+        length=6,
+        minimum=-1e9,
+        maximum=1e9,
+        doc="true state at the start relative to the chief, Hill frame",
     )
     mass: float = parameter(100.0, unit="kg", above=0.0, doc="mass")
     thrust_limit: tuple[float, ...] = parameter(
@@ -38,12 +43,17 @@ class PlantParameters(Mission):
     """The run and its satellites."""
 
     seed: int = parameter(1, minimum=0, doc="seed of every random number of the run")
-    duration: float = parameter(unit="s", above=0.0, doc="simulated time to fly, whole ticks")
+    duration: float = parameter(
+        unit="s", above=0.0, maximum=LAST_SECOND, doc="simulated time to fly, whole ticks"
+    )
     real_time_factor: float = parameter(
         0.0, minimum=0.0, doc="simulated seconds per wall second at most; 0 for as fast as possible"
     )
     deadline: float = parameter(
-        2.0, unit="s", above=0.0, doc="wall time a deputy has for its answer before it gets no thrust for the tick"
+        2.0,
+        unit="s",
+        above=0.0,
+        doc="wall time a deputy has for its answer before it gets no thrust for the tick",
     )
     wait_for_recorder: bool = parameter(False, doc="do not start before a recorder listens to everything")
     deputies: tuple[str, ...] = parameter(("deputy1",), doc="names of the deputies, each a namespace")
@@ -54,7 +64,8 @@ class PlantParameters(Mission):
         super().__post_init__()
         if len(set(self.deputies)) != len(self.deputies) or not self.deputies:
             raise ConfigurationError(
-                f"parameter deputies: {list(self.deputies)} is not allowed; it must be one or more different names"
+                f"parameter deputies: {list(self.deputies)} is not allowed; "
+                "it must be one or more different names"
             )
         for name in self.deputies:
             if not (name.isidentifier() and name.isascii()):
@@ -62,7 +73,9 @@ class PlantParameters(Mission):
                     f"parameter deputies: {name!r} is not allowed; a name has letters, digits and _ only"
                 )
         if round(self.duration * NANOSECONDS) < self.tick_ns:
-            raise ConfigurationError(f"parameter duration: {self.duration!r} s is not allowed; it must be a tick or more")
+            raise ConfigurationError(
+                f"parameter duration: {self.duration!r} s is not allowed; it must be a tick or more"
+            )
 
     @property
     def ticks(self) -> int:
@@ -73,12 +86,12 @@ class PlantParameters(Mission):
 class Plant:
     """Two-body plus J2 truth in the inertial frame, with thrust held over each tick.
 
-    Use: at every tick `observe`, then `step` with the deputies' forces. Thrust acts along the Hill axes at the tick's start,
-    fixed in inertial space over the tick.
+    Use: at every tick `observe`, then `step` with the deputies' forces. Thrust acts along the Hill axes at
+    the tick's start, fixed in inertial space over the tick.
     """
 
     def __init__(self, parameters: PlantParameters) -> None:
-        """Place chief and deputies; raises ConfigurationError for an orbit that cannot be flown."""
+        """Place chief and deputies; raises ConfigurationError for one below the Earth's surface."""
         self.parameters = parameters
         self.tick = 0
         chief = state_from_elements(Elements(**vars(parameters.chief)))
@@ -87,6 +100,14 @@ class Plant:
         self._states = np.array(
             [chief, *(inertial_from_relative(chief, np.array(deputy.relative_state)) for deputy in deputies)]
         )
+        for name, radius in zip(
+            ("chief", *self._names), np.linalg.norm(self._states[:, :3], axis=1), strict=True
+        ):
+            if radius < EARTH_RADIUS:
+                raise ConfigurationError(
+                    f"{name}: a start at radius {radius:.6g} m is not allowed; "
+                    f"it must be at least {EARTH_RADIUS:g} m"
+                )
         self._masses = [deputy.mass for deputy in deputies]
         self._limits = [np.array(deputy.thrust_limit) for deputy in deputies]
         self._forces = [np.zeros(3) for _ in deputies]
@@ -140,8 +161,8 @@ class Plant:
     def step(self, forces: Mapping[str, Vector]) -> list[str]:
         """Fly one tick under the deputies' forces (3,), Hill frame, N.
 
-        A deputy without an entry, or with a force that is not finite, missed the tick: it gets no thrust, and a fix with its next
-        measurement, since it may have lost its state.
+        A deputy without an entry, or with a force that is not finite, missed the tick: it gets no thrust, and
+        a fix with its next measurement, since it may have lost its state.
 
         Returns:
             Names of the deputies that missed the tick.

@@ -15,10 +15,13 @@ from formation_gnc.control.autopilot import ControllerParameters
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.guidance.guide import GuidanceParameters
 from formation_gnc.navigation.navigator import NavigationParameters
-from formation_gnc.parameters import dump, load
+from formation_gnc.parameters import dump, load, read_yaml
 from formation_gnc.plant.plant import PlantParameters
 
 SECTION = "ros__parameters"
+
+NODE = re.compile(r"/?([A-Za-z0-9_]+|\*\*?)(/([A-Za-z0-9_]+|\*\*?))*")
+"""Names of nodes and patterns of them that ROS takes in a parameter file."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,7 @@ class Scenario:
         return {node: dump(values) for node, values in nodes.items()}
 
     def write(self, path: Path, extra: Mapping[str, Mapping[str, Any]]) -> None:
-        """Write the scenario as a ROS 2 parameter file with nothing left to defaults, and `extra` on top of it."""
+        """Write the scenario as a ROS 2 parameter file, nothing left to defaults and `extra` on top of it."""
         nodes = self.parameters()
         for node, values in extra.items():
             nodes[node] = nodes.get(node, {}) | dict(values)
@@ -101,7 +104,9 @@ def find_scenario(name: str) -> Path:
         if (directory / f"{name}.yaml").is_file():
             return directory / f"{name}.yaml"
     known = sorted(path.stem for directory in directories for path in directory.glob("*.yaml"))
-    raise ConfigurationError(f"scenario {name}: unknown; it must be a parameter file or one of {', '.join(known)}")
+    raise ConfigurationError(
+        f"scenario {name}: unknown; it must be a parameter file or one of {', '.join(known)}"
+    )
 
 
 def _directories() -> Iterator[Path]:
@@ -127,7 +132,8 @@ def _load(schema: Any, sections: list[tuple[str, Mapping[str, Any]]], node: str)
 def _matches(pattern: str, node: str) -> bool:
     """Whether a parameter file's node name, with ``*`` for one token and ``**`` for any, means this node."""
     expression = "".join(
-        {"**": "(/[^/]+)*", "*": "/[^/]+"}.get(token, "/" + re.escape(token)) for token in pattern.strip("/").split("/")
+        {"**": "(/[^/]+)*", "*": "/[^/]+"}.get(token, "/" + re.escape(token))
+        for token in pattern.strip("/").split("/")
     )
     return re.fullmatch(expression, node) is not None
 
@@ -135,10 +141,10 @@ def _matches(pattern: str, node: str) -> bool:
 def _sections(path: Path) -> list[tuple[str, dict[str, Any]]]:
     """Node patterns of a parameter file with their parameters by dotted name, in the file's order."""
     try:
-        document = yaml.safe_load(path.read_text())
+        document = read_yaml(path.read_text())
     except OSError as error:
         raise ConfigurationError(f"{path}: cannot be read ({error.strerror})") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except (yaml.YAMLError, ValueError) as error:  # undecodable text, or a date that there is not
         raise ConfigurationError(f"{path}: not YAML ({' '.join(str(error).split())})") from None
     if not isinstance(document, dict):
         raise ConfigurationError(f"{path}: not a ROS 2 parameter file; it must map node names to {SECTION}")
@@ -147,12 +153,17 @@ def _sections(path: Path) -> list[tuple[str, dict[str, Any]]]:
 
 def _walk(path: Path, tree: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, dict[str, Any]]]:
     for key, value in tree.items():
+        name = f"{prefix}/{key}" if prefix else str(key)
         if not isinstance(value, dict):
-            raise ConfigurationError(f"{path}: {prefix}{key} is not a section; it must map to {SECTION}")
-        if key == SECTION:
-            yield prefix.rstrip("/") or "/", dict(_flatten(value))
+            raise ConfigurationError(f"{path}: {name} is not a section; it must map to {SECTION}")
+        if key == SECTION and prefix:
+            yield prefix, dict(_flatten(value))
+        elif NODE.fullmatch(name):
+            yield from _walk(path, value, name)
         else:
-            yield from _walk(path, value, f"{prefix}{str(key).strip('/')}/" if prefix else f"/{str(key).strip('/')}/")
+            raise ConfigurationError(
+                f"{path}: {name} is no node; a name has letters, digits, _ and / only, or * or ** between /"
+            )
 
 
 def _flatten(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -165,5 +176,7 @@ def _flatten(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, A
 
 def duration_of(orbits: float, scenario: Scenario) -> float:
     """Duration (s) of a number of the chief's two-body orbits, in whole ticks."""
+    if not 0.0 < orbits < math.inf:
+        raise ConfigurationError(f"orbits: {orbits!r} is not allowed; it must be above 0 and finite")
     tick = scenario.plant.tick
     return math.ceil(orbits * 2.0 * math.pi / scenario.plant.mean_motion / tick - 1e-9) * tick
