@@ -1,11 +1,15 @@
 """The packages as colcon sees them, the environment as a user gets it, and what a lacking machine is told."""
 
+import ast
 import os
 import re
+import runpy
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -29,6 +33,15 @@ def colcon_list(cwd: Path, *arguments: str) -> dict[str, str]:
     assert listing.returncode == 0, listing.stderr
     rows = (line.split("\t") for line in listing.stdout.splitlines())
     return {name: kind.strip("()") for name, _, kind in rows}
+
+
+def imports(file: Path) -> Iterator[str]:
+    """Yield the module that each import statement in a Python file names."""
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            yield node.module
 
 
 def workspace(folder: Path) -> Path:
@@ -71,6 +84,17 @@ def test_versions_agree():
     }
     for name, statement in stated.items():
         assert statement.format(formation_gnc.__version__) in (ROOT / name).read_text(), name
+
+
+@needs_set_up
+def test_package_xml_declares_the_ros_packages_that_are_imported():
+    files = [*ROOT.glob("formation_gnc/**/*.py"), *ROOT.glob("launch/*.py")]
+    imported = {name.split(".")[0] for file in files for name in imports(file)}
+    declared = {element.text for element in ElementTree.parse(ROOT / "package.xml").iter("exec_depend")}
+    query = "import ament_index_python as index; print(*index.get_packages_with_prefixes())"
+    listing = run("bash", "-c", f"source {ROOT}/env.sh && python -c '{query}'")
+    there = {*listing.stdout.split(), "launch", "launch_ros"}  # the wheels leave these two out
+    assert declared == imported & there - {"formation_gnc"}
 
 
 @needs_set_up
@@ -171,6 +195,13 @@ def test_the_lock_pins_every_package_with_its_hashes():
             assert re.match(r"[a-z0-9-]+==\S+ \\\n    --hash=sha256:[0-9a-f]{64}", entry), entry.split("\n")[
                 0
             ]
+
+
+def test_the_launch_file_starts_every_node():
+    pytest.importorskip("launch_ros", reason="launch comes with an installed ROS only")
+    launch_file = ROOT / "launch/leader_follower.launch.py"
+    description = runpy.run_path(str(launch_file))["generate_launch_description"]()
+    assert {node.node_executable for node in description.entities} == NODES
 
 
 @needs_set_up

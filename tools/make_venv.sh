@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Makes .venv anew, with everything that requirements.lock names: ROS 2 too, unless the machine has it.
+# Makes .venv with everything that requirements.lock names: ROS 2 too, unless the machine has it. One that was
+# made for the same ROS and the same place is kept, and brought up to the lock.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 read -r ros _ < .ros  # the prefix of the ROS 2 in use, or "wheels"
@@ -64,9 +65,11 @@ else
     left_out='^(ros-|catkin-pkg=|empy=|lark-parser=)'  # an installed ROS brings its own
 fi
 
-echo "formation_gnc: making .venv with $python (a minute or two, once)"
-rm -rf .venv build/formation_gnc build/formation_gnc_msgs install  # what was built on the old one goes with it
-"$python" -m venv "${options[@]}" .venv
+if ! cmp --quiet .ros .venv/.ros; then
+    echo "formation_gnc: making .venv with $python (a minute or two, once)"
+    rm -rf .venv build/formation_gnc build/formation_gnc_msgs install  # what was built on the old one goes with it
+    "$python" -m venv "${options[@]}" .venv
+fi
 
 install() { # awk condition on the lines of the lock that name a package
     awk '/^[^ #]/ { keep = '"$1"' } keep' requirements.lock > .venv/requirements.txt
@@ -88,3 +91,4 @@ export PATH="$PWD/.venv/bin:\$PATH"
 END
     done
 fi
+cp .ros .venv/.ros
