@@ -119,9 +119,9 @@ def test_sdc1_and_sdc2_are_hills_equations_close_to_a_circular_chief(chief, time
     w = circular.angular_rate
     for factorisation in (sdc1, sdc2):
         matrix = factorisation(np.array([1e-3, 1e-3, 1e-3, 0, 0, 0]), circular)
-        assert matrix[3, 0] == pytest.approx(3.0 * w**2, rel=1e-8)
+        assert matrix[3, 0] == pytest.approx(3.0 * w**2, rel=1e-8, abs=0.0)
         assert abs(matrix[4, 1]) < 1e-8 * w**2
-        assert matrix[5, 2] == pytest.approx(-(w**2), rel=1e-8)
+        assert matrix[5, 2] == pytest.approx(-(w**2), rel=1e-8, abs=0.0)
 
 
 def test_several_states_at_once_give_the_single_matrices():

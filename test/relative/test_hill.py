@@ -47,9 +47,9 @@ def test_short_tick_keeps_full_precision():
     # A millisecond: naive angle - sin(angle) would leave no correct digit. The Taylor terms are exact here.
     n, tick = 1e-3, 1e-3
     free, forced = HillModel(n).discretise(0.0, tick)
-    assert free[1, 0] == pytest.approx(-((n * tick) ** 3), rel=1e-12)
-    assert forced[0, 1] == pytest.approx(n * tick**3 / 3.0, rel=1e-12)
-    assert forced[1, 0] == pytest.approx(-n * tick**3 / 3.0, rel=1e-12)
+    assert free[1, 0] == pytest.approx(-((n * tick) ** 3), rel=1e-12, abs=0.0)
+    assert forced[0, 1] == pytest.approx(n * tick**3 / 3.0, rel=1e-12, abs=0.0)
+    assert forced[1, 0] == pytest.approx(-n * tick**3 / 3.0, rel=1e-12, abs=0.0)
     np.testing.assert_allclose(np.diag(forced[:3]), tick**2 / 2.0, rtol=1e-9)
 
 
