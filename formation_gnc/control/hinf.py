@@ -71,7 +71,7 @@ class HinfParameters:
         doc="w_T: tau, inverse of the frequency at which the uncertainty reaches 1",
     )
     thrust: tuple[float, ...] = parameter(
-        (5e-4, 5e-4, 5e-4),
+        (1e-3, 1e-3, 1e-3),
         unit="N/m",
         length=3,
         above=0.0,
@@ -79,7 +79,7 @@ class HinfParameters:
         doc="w_u: force per metre of disturbance that weighs one",
     )
     disturbance: float = parameter(
-        1e-6,
+        3e-6,
         unit="1/s^2",
         minimum=0.0,
         in_flight=True,
@@ -93,7 +93,7 @@ class HinfParameters:
         doc="shift of the plant's poles in the design (Neokleous: 0.1 / min)",
     )
     gamma_margin: float = parameter(
-        0.3, above=0.0, in_flight=True, doc="how far above the best gamma the law is designed, relative to it"
+        0.1, above=0.0, in_flight=True, doc="how far above the best gamma the law is designed, relative to it"
     )
 
 

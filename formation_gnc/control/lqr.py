@@ -123,7 +123,7 @@ class LinearQuadraticRegulator(Controller):
             solution.
         """
         model = DESIGN_MODELS[parameters.model](mission)
-        self._tick = mission.tick
+        self.tick = mission.tick
         self._limit = vehicle.thrust_limit
         self._integrates = parameters.integral_error > 0.0
         self._feed_forward = FeedForward(parameters.feed_forward, model)
@@ -139,7 +139,7 @@ class LinearQuadraticRegulator(Controller):
 
     def _design(self, parameters: LqrParameters, model: RelativeModel, weights: Weights) -> None:
         """Set `gain` (3, n), or the table `gains` (N, 3, n) at intervals of `interval` s."""
-        tick = self._tick
+        tick = self.tick
         self.gains = np.empty((0, 3, 6))
         self.interval = tick
         self._finite = parameters.gain == "finite"
@@ -172,8 +172,8 @@ class LinearQuadraticRegulator(Controller):
                 self.gains = finite_gains(phi, gamma, weights, terminal, steps)
 
     def _discretise(self, model: RelativeModel, time: float) -> tuple[Matrix, Matrix]:
-        phi, gamma = model.discretise(time, self._tick)
-        return self._augmented(phi, gamma, np.eye(3), self._tick)
+        phi, gamma = model.discretise(time, self.tick)
+        return self._augmented(phi, gamma, np.eye(3), self.tick)
 
     def _augmented(
         self, dynamics: Matrix, inputs: Matrix, kept: Matrix | float = 0.0, rate: float = 1.0
@@ -192,7 +192,7 @@ class LinearQuadraticRegulator(Controller):
         if not len(self.gains):
             return self.gain
         if self._finite:
-            step = (time - (time if self._start is None else self._start)) // round(self._tick * NANOSECONDS)
+            step = (time - (time if self._start is None else self._start)) // round(self.tick * NANOSECONDS)
             return self.gains[step] if step < len(self.gains) else self.gain
         place = time / NANOSECONDS / self.interval - 0.5
         index = int(np.floor(place))
@@ -218,7 +218,7 @@ class LinearQuadraticRegulator(Controller):
         force = estimate.mass * (acceleration + wanted)
         if self._integrates:
             # Anti-wind-up: what an axis at its limit cannot give, more integral would not get.
-            self._integral += np.where(np.abs(force) < self._limit, error[:3], 0.0) * self._tick
+            self._integral += np.where(np.abs(force) < self._limit, error[:3], 0.0) * self.tick
         return Command(force, fallback=reason)
 
 

@@ -12,12 +12,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import LinAlgError, expm, solve_continuous_are
+from scipy.linalg import expm, solve_continuous_are
 
 from formation_gnc.errors import DesignError
 from formation_gnc.interface import Matrix, Vector
-
-LARGEST_GAMMA = 1e6
 
 
 @dataclass(frozen=True)
@@ -151,33 +149,19 @@ class Problem:
 
     def _full_information(self, margin: float) -> tuple[LinearController, float, float]:
         a, b, c, effort, disturbance = self._scaled()
-
-        def gain(gamma: float) -> Matrix | None:
-            r = np.diag(np.concatenate([effort**2, np.full(3, -(gamma**2))]))
-            try:
-                x = solve_continuous_are(a, np.hstack([b, disturbance * b]), c.T @ c, r)
-            except (LinAlgError, ValueError):
-                return None
-            result: Matrix = -(b.T @ x) / effort[:, None] ** 2
-            worst = disturbance**2 / gamma**2 * b @ b.T @ x
-            stable = (np.linalg.eigvals(a + b @ result + worst).real < 0.0).all()
-            return result if stable and np.linalg.eigvalsh(x).min() > -1e-9 * np.abs(x).max() else None
-
-        high, low = LARGEST_GAMMA * disturbance, 0.0
-        if gain(high) is None:
-            raise ValueError(f"none even at gamma = {high:.3g}")
-        while high - low > 1e-3 * high:
-            middle = 0.5 * (high + low)
-            high, low = (middle, low) if gain(middle) is not None else (high, middle)
-        gamma = (1.0 + margin) * high
-        feedback = gain(gamma)
-        if feedback is None:
-            raise ValueError(f"none at gamma = {gamma:.3g}")
+        # Disturbance and thrust come in at the same place. So the game's Riccati equation is that of an LQR
+        # whose thrust costs more, without bound as gamma falls to the gain from the disturbance to a thrust
+        # that just cancels it.
+        best = disturbance * float(effort.max())
+        gamma = (1.0 + margin) * best
+        price = effort**2 / (1.0 - (disturbance * effort / gamma) ** 2)
+        x = solve_continuous_are(a, b, c.T @ c, np.diag(price))
+        feedback = -(b.T @ x) / effort[:, None] ** 2
         inputs = np.hstack([np.vstack([np.eye(3), np.eye(3)]), np.zeros((6, 3))])
         controller = self._unscaled(
             a[6:, 6:], inputs, feedback[:, 6:], feedback[:, :6], np.repeat([1.0, self.rate], 3)
         )
-        return controller, high, gamma
+        return controller, best, gamma
 
     def _unscaled(self, a: Matrix, b: Matrix, c: Matrix, d: Matrix, unit: Vector) -> LinearController:
         """The controller in SI units; `unit` is the SI size of one scaled unit of each measured error."""

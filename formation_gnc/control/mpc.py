@@ -153,9 +153,8 @@ class ModelPredictiveController(Controller):
             )
         self._steps = parameters.control_horizon or parameters.horizon
         if self._steps > parameters.horizon:
-            raise DesignError(
-                f"mpc: control_horizon is {self._steps} steps; it must be at most horizon, {parameters.horizon}"
-            )
+            allowed = f"it must be at most horizon, {parameters.horizon}"
+            raise DesignError(f"mpc: control_horizon is {self._steps} steps; {allowed}")
         self._model = DESIGN_MODELS[parameters.model](mission)
         self._limit, self._mass = vehicle.thrust_limit, vehicle.mass
         if parameters.total_thrust > 0.0:
@@ -169,7 +168,7 @@ class ModelPredictiveController(Controller):
                 f"mpc: the horizon with thrust, {self._steps * parameters.step:.0f} s, is not longer "
                 f"than the eclipse, {self._night.longest:.0f} s"
             )
-        self._reserve = LinearQuadraticRegulator(
+        self.reserve = LinearQuadraticRegulator(
             LqrParameters(
                 model=parameters.model,
                 gain="discrete" if self._model.is_time_invariant else "periodic",
@@ -292,6 +291,12 @@ class ModelPredictiveController(Controller):
             polishing=False,
         )
 
+    @property
+    def size(self) -> tuple[int, int, int]:
+        """Variables, constraints and stored entries of the quadratic programme."""
+        rows, variables = self._rows.shape
+        return variables, rows, self._rows.nnz + len(self._hessian(self._programmes[0]))
+
     def _hessian(self, programme: Programme) -> Vector:
         return np.concatenate([programme.hessian, self._hessian_rest])
 
@@ -313,7 +318,7 @@ class ModelPredictiveController(Controller):
         if command is None:
             command = self._follow(time, f"mpc: {self._answer}; the last plan flies")
         if command is None:
-            reserve = self._reserve.command(estimate, target).force
+            reserve = self.reserve.command(estimate, target).force
             command = Command(reserve, fallback=f"mpc: {self._answer}; no plan, LQR flies")
         self._force = np.clip(command.force, -self._limit, self._limit)
         return Command(

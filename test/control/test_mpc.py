@@ -40,7 +40,7 @@ def fly(law, model, estimate, target, start, ticks, tick=10.0, mass=100.0, dark=
 def test_without_active_limits_it_is_the_lqr(mission, vehicle, estimate, target):
     law = make(mission, vehicle, step=10.0)
     for state in (OFFSET, [0, 5, 0, 0.01, 0, 0], [-3, 0, 8, 0, -0.01, 0.01]):
-        expected = law._reserve.command(estimate(state), target()).force
+        expected = law.reserve.command(estimate(state), target()).force
         law._plan = np.empty((0, 3))
         # What the solver's accuracy leaves: 1e-4 of the thrust limit, times some tens for the flat directions
         # of the cost.
@@ -245,7 +245,7 @@ def test_what_cannot_be_solved_flies_the_last_plan_and_then_lqr(mission, vehicle
         "mpc: primal infeasible"
     )  # 350 s are too short to bring 10 mN down to none
     assert first.fallback.endswith("no plan, LQR flies")
-    np.testing.assert_allclose(first.force, law._reserve.command(estimate(OFFSET), target()).force)
+    np.testing.assert_allclose(first.force, law.reserve.command(estimate(OFFSET), target()).force)
     good = make(mission, vehicle)
     planned = good.command(estimate(OFFSET), target())
     lost = good.command(estimate(1e200 * np.ones(6), 10.0), target(time=10.0))

@@ -1,0 +1,60 @@
+import json
+
+import numpy as np
+import pytest
+
+from formation_gnc.control.autopilot import ControllerParameters
+from formation_gnc.control.report import design, draw
+from formation_gnc.parameters import load
+
+VALUES = {"chief.semi_major_axis": 6978100.0, "chief.inclination": 1.48, "tick": 10.0}
+
+
+def described(**values):
+    return design(
+        load(ControllerParameters, VALUES | {key.replace("__", "."): value for key, value in values.items()})
+    )
+
+
+@pytest.mark.parametrize("algorithm", ["coast", "lqr", "hinf", "mpc"])
+def test_every_law_is_described_and_drawn(algorithm, tmp_path):
+    designed = described(algorithm=algorithm, lqr__integral_error=3000.0)
+    json.dumps(designed.figures)
+    assert draw(designed, tmp_path / "design.png").stat().st_size > 10_000
+    if algorithm != "coast":
+        assert designed.poles.real.max() < 0.0
+        assert np.abs(designed.recovery[-1, 1:]).max() < 0.1
+        assert np.abs(designed.recovery[0, 1:] - 1.0).max() == 0.0
+
+
+def test_lqr_margins_are_those_that_theory_promises():
+    # A continuous LQR with equal weights on the inputs has a gain margin of 1/2 to infinity and 60 degrees at
+    # once in all of them; the tick takes a little of both (Safonov and Athans 1977).
+    designed = described(algorithm="lqr", tick=1.0)
+    assert designed.figures["largest S_I"] < 1.01
+    assert designed.figures["phase margin [deg]"] > 59.0
+    assert designed.figures["gain margin, down"] < 0.51
+    assert designed.figures["gain margin, up"] > 50.0
+
+
+@pytest.mark.parametrize("changes", [{}, {"lqr__integral_error": 3000.0}, {"algorithm": "hinf"}])
+def test_the_loop_stays_stable_up_to_the_gain_margin(changes):
+    # The same thing from the other side: scale the thrust and close the loop.
+    from formation_gnc.control import report
+
+    parameters = load(ControllerParameters, VALUES | {k.replace("__", "."): v for k, v in changes.items()})
+    own = getattr(parameters, parameters.algorithm)
+    law = report.ALGORITHMS[parameters.algorithm](own, parameters, report.Vehicle(100.0, np.full(3, 0.01)))
+    margins, controller = design(parameters).figures, report._linear(law)
+    phi, gamma = report.DESIGN_MODELS[own.model](parameters).discretise(0.0, parameters.tick)
+    for share in np.linspace(
+        margins["gain margin, down"] * 1.01, min(margins["gain margin, up"] or 20.0, 20.0) * 0.99, 12
+    ):
+        assert np.abs(np.linalg.eigvals(controller.closed_loop(phi, gamma * share))).max() < 1.0
+
+
+def test_the_size_of_the_programme():
+    figures = described(algorithm="mpc", mpc__horizon=20, mpc__total_thrust=0.01).figures
+    assert figures["variables"] == 60
+    assert figures["constraints"] == 60 + 20 * 10
+    assert figures["horizon [s]"] == 1200.0
