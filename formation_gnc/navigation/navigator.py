@@ -1,183 +1,499 @@
-"""Relative navigation of one deputy by an extended Kalman filter."""
+"""Relative navigation of one deputy, from measurement to estimate."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from math import isfinite, sqrt
 
 import numpy as np
-from filterpy.kalman import ExtendedKalmanFilter
 
-from formation_gnc.interface import NANOSECONDS, Estimate, EstimateStatus, Measurement, Sensor, Vector
-from formation_gnc.navigation.measurement import predicted_readings
-from formation_gnc.orbit.frames import (
-    hill_rotation,
-    hill_transform,
-    hill_transform_inverse,
-    inertial_from_relative,
-    relative_from_inertial,
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.interface import (
+    NANOSECONDS,
+    Estimate,
+    EstimateStatus,
+    Matrix,
+    Measurement,
+    Refusal,
+    Sensor,
+    Vector,
 )
-from formation_gnc.orbit.propagation import advance_with_transition
+from formation_gnc.navigation import kernels
+from formation_gnc.navigation.consistency import Consistency, Verdict
+from formation_gnc.navigation.filters import FILTERS, RelativeFilter
+from formation_gnc.navigation.measurement import NAMES, Readings, Track
+from formation_gnc.navigation.observability import Observability, orbit_period
+from formation_gnc.navigation.process import PROCESS_MODELS, Leg, ProcessModel, process_noise, substeps
+from formation_gnc.navigation.screening import Refusals, Screen, credible_chief, credible_fix, sound
 from formation_gnc.parameters import parameter
-from formation_gnc.part import Part, Schedulable
+from formation_gnc.part import Configuration, Part, Schedulable
+
+CHIEF_DISTANCE, CHIEF_SPEED = 100.0, 1.0
+"""How far (m, m/s) the chief's ephemeris may jump in a tick of a second or more from where gravity with J2
+takes it, and in proportion in a shorter one: much more than the model leaves out, much less than a frozen
+ephemeris is off."""
+
+_NO_ACCELERATION = np.zeros(3)
+_UNKNOWN = np.full(6, np.nan)
 
 
 @dataclass(frozen=True)
 class NavigationParameters(Schedulable):
-    """What the filter believes of its sensors, its start and its model."""
+    """What the filter believes of its sensors, its start and its model, and how it answers bad input."""
 
-    radius_sigma: float = parameter(
-        5.0, unit="m", above=0.0, in_flight=True, doc="standard deviation of the radius reading"
+    filter: str = parameter(
+        "ekf", choices=tuple(FILTERS), in_flight=True, doc="extended or unscented Kalman filter"
     )
-    range_rate_sigma: float = parameter(
-        0.01, unit="m/s", above=0.0, in_flight=True, doc="standard deviation of the range-rate reading"
-    )
-    latitude_sigma: float = parameter(
-        1e-6, unit="rad", above=0.0, in_flight=True, doc="standard deviation of the latitude reading"
-    )
-    fix_position_sigma: float = parameter(
-        0.5, unit="m", above=0.0, doc="standard deviation of an acquisition fix, each axis"
-    )
-    fix_velocity_sigma: float = parameter(
-        0.0005, unit="m/s", above=0.0, doc="standard deviation of an acquisition fix, each axis"
+    process_model: str = parameter(
+        "nonlinear_j2",
+        choices=tuple(PROCESS_MODELS),
+        in_flight=True,
+        doc="motion that the filter predicts with",
     )
     acceleration_density: float = parameter(
-        1e-14, unit="m^2/s^3", minimum=0.0, in_flight=True, doc="power density of the unmodelled acceleration, each axis"
+        1e-14,
+        unit="m^2/s^3",
+        minimum=0.0,
+        maximum=1.0,
+        in_flight=True,
+        doc="power density of the unmodelled acceleration, each axis",
     )
+    sensors: tuple[str, ...] = parameter(
+        ("radius", "range_rate", "latitude"),
+        in_flight=True,
+        doc="sensors whose readings are used, of radius, range_rate, latitude, right_ascension, chief_range",
+    )
+    pseudo_measurements: bool = parameter(
+        False,
+        in_flight=True,
+        doc="take radius, range rate and latitude as r^2 - r_c^2, r r' and r sin(latitude) (Neokleous 3.13), "
+        "when all three are there",
+    )
+    radius_sigma: float = parameter(
+        5.0,
+        unit="m",
+        minimum=1e-6,
+        maximum=1e9,
+        in_flight=True,
+        doc="standard deviation of the radius reading",
+    )
+    range_rate_sigma: float = parameter(
+        0.01,
+        unit="m/s",
+        minimum=1e-9,
+        maximum=1e6,
+        in_flight=True,
+        doc="standard deviation of the range-rate reading",
+    )
+    latitude_sigma: float = parameter(
+        1e-6,
+        unit="rad",
+        minimum=1e-12,
+        maximum=10.0,
+        in_flight=True,
+        doc="standard deviation of the latitude reading",
+    )
+    right_ascension_sigma: float = parameter(
+        1e-6,
+        unit="rad",
+        minimum=1e-12,
+        maximum=10.0,
+        in_flight=True,
+        doc="standard deviation of the right-ascension reading",
+    )
+    chief_range_sigma: float = parameter(
+        1.0,
+        unit="m",
+        minimum=1e-6,
+        maximum=1e9,
+        in_flight=True,
+        doc="standard deviation of the reading of the distance to the chief",
+    )
+    fix_position_sigma: float = parameter(
+        0.5, unit="m", minimum=1e-6, maximum=1e6, doc="standard deviation of an acquisition fix, each axis"
+    )
+    fix_velocity_sigma: float = parameter(
+        0.0005,
+        unit="m/s",
+        minimum=1e-9,
+        maximum=1e3,
+        doc="standard deviation of an acquisition fix, each axis",
+    )
+    gate: float = parameter(
+        5.0,
+        minimum=1.0,
+        maximum=1e6,
+        in_flight=True,
+        doc="a reading further from its prediction than so many standard deviations is refused: chi-square, "
+        "one degree of freedom",
+    )
+    latest: float = parameter(
+        60.0,
+        unit="s",
+        minimum=0.0,
+        maximum=3600.0,
+        in_flight=True,
+        doc="age above which a reading is refused",
+    )
+    longest_gap: float = parameter(
+        3600.0,
+        unit="s",
+        above=0.0,
+        maximum=1e6,
+        in_flight=True,
+        doc="time without a measurement beyond which the filter does not predict: it waits for a fix",
+    )
+    coasting_after: float = parameter(
+        60.0,
+        unit="s",
+        above=0.0,
+        in_flight=True,
+        doc="time without a reading after which the status says coasting",
+    )
+    observability_window: float = parameter(
+        0.0,
+        unit="s",
+        minimum=0.0,
+        maximum=1e6,
+        in_flight=True,
+        doc="time over which the blind direction is sought; 0 for one orbit",
+    )
+
+    @property
+    def legs(self) -> int:
+        """Ticks that a reading may be late."""
+        return -(-round(self.latest * NANOSECONDS) // self.tick_ns)
+
+    def __post_init__(self) -> None:
+        """Raise ConfigurationError for sensors that do not exist or stand twice."""
+        super().__post_init__()
+        known = list(NAMES.values())
+        if (
+            not self.sensors
+            or len(set(self.sensors)) != len(self.sensors)
+            or not set(self.sensors) <= set(known)
+        ):
+            raise ConfigurationError(
+                f"parameter sensors: {list(self.sensors)} is not allowed; it must be one or more "
+                f"different of {', '.join(known)}"
+            )
 
 
 @dataclass(frozen=True)
-class NoiseModel:
-    """Noise of the readings and of the process, ready for use."""
+class Design:
+    """What follows from the parameters."""
 
+    process: ProcessModel
+    noise: Matrix
+    """(6, 6) covariance that the process adds over a tick."""
     variance: dict[int, float]
-    """Of each sensor's reading."""
-    process: np.ndarray
-    """(6, 6) covariance that the unmodelled acceleration adds over a tick."""
+    """Of the noise of every sensor in use."""
+    gate: float
+    """Largest innovation squared over its variance."""
 
 
-class RelativeFilter(ExtendedKalmanFilter):  # type: ignore[misc]
-    """FilterPy's EKF over the relative state in the Hill frame, with the exact motion under gravity with J2.
+@dataclass
+class Flight:
+    """All that the filter carries from tick to tick."""
 
-    The prediction flies the deputy in the inertial frame beside the chief's ephemeris, so that it assumes neither a circular
-    chief nor a small separation; the transition matrix is that of the inertial flight, seen in the Hill frames at both ends.
-    """
-
-    def __init__(self, state: Vector, chief_state: Vector) -> None:
-        """Start from a relative state (6,) at the time of the chief's inertial state (6,)."""
-        super().__init__(dim_x=6, dim_z=3)
-        self.x = state.copy()
-        self.chief_state = chief_state
-        self._predicted = self.x
-
-    def fly(self, chief_state: Vector, acceleration: Vector, tick: float) -> None:
-        """Predict over a tick, at whose end the chief has the given inertial state.
-
-        Args:
-            chief_state: (6,) m and m/s.
-            acceleration: (3,) by thrust, along the Hill axes at the tick's start, m/s^2.
-            tick: s.
-        """
-        old = self.chief_state
-        deputy, transition = advance_with_transition(
-            inertial_from_relative(old, self.x), acceleration @ hill_rotation(old), tick, 1
-        )
-        self._predicted = relative_from_inertial(chief_state, deputy)
-        self.F = hill_transform(chief_state) @ transition @ hill_transform_inverse(old)
-        self.chief_state = chief_state
-        self.predict()
-
-    def predict_x(self, u: float = 0) -> None:
-        """Take the nonlinear prediction; FilterPy's own would be F x."""
-        self.x = self._predicted
+    filter: RelativeFilter
+    time: int
+    """Stamp of the state, ns."""
+    chief: Vector
+    """(6,) inertial state of the chief, as told or as flown on."""
+    mass: float
+    track: Track
+    screen: Screen
+    observability: Observability
+    told: Vector = field(default_factory=lambda: _UNKNOWN)
+    """(6,) the chief as the ephemeris had it last, believed or not."""
+    last_reading: int = 0
+    """Stamp at which a reading was last used, ns."""
+    consistency: Consistency = field(default_factory=Consistency)
+    chief_known: bool = True
 
 
-class Navigator(Part[NavigationParameters, NoiseModel]):
+class Navigator(Part[NavigationParameters, Design]):
     """Filter of one deputy, from measurement to estimate.
 
-    It starts from the acquisition fix of a first tick, or of the tick after a missed one when it has lost its state.
+    It starts from the acquisition fix of a first tick, or of the tick after a missed one when it has lost
+    its state. What it is given may be wrong in any way: it is refused with a reason that is counted, and
+    the estimate stays finite, its covariance positive definite. When the readings contradict the state, the
+    covariance is inflated; when that does not help, the state is given up: the navigator falls silent,
+    which is a missed tick, after which a fix comes.
     """
 
     def __init__(self, name: str, parameters: NavigationParameters) -> None:
-        """Without a state until a fix comes."""
+        """Without a state until a fix comes; `name` is the node's, its namespace the deputy's."""
+        self._deputy = name.split("/")[-2] if name.count("/") > 1 else ""
+        self._flight: Flight | None = None
+        self._refusals = Refusals()
         super().__init__(name, parameters)
-        self._filter_time = -1
-        self._filter: RelativeFilter | None = None
 
-    def design(self, parameters: NavigationParameters) -> NoiseModel:
-        """Noise of the readings as variances, of the process integrated over a tick."""
-        tick, density, unit = parameters.tick, parameters.acceleration_density, np.eye(3)
-        return NoiseModel(
-            {
-                int(Sensor.RADIUS): parameters.radius_sigma**2,
-                int(Sensor.RANGE_RATE): parameters.range_rate_sigma**2,
-                int(Sensor.LATITUDE): parameters.latitude_sigma**2,
-            },
-            density
-            * np.block([[tick**3 / 3.0 * unit, tick**2 / 2.0 * unit], [tick**2 / 2.0 * unit, tick * unit]]),
+    def design(self, parameters: NavigationParameters) -> Design:
+        """Process model, noise over a tick, variances."""
+        used = [sensor for sensor in Sensor if NAMES[sensor] in parameters.sensors]
+        return Design(
+            PROCESS_MODELS[parameters.process_model](parameters),
+            process_noise(parameters.acceleration_density, parameters.tick),
+            {int(sensor): getattr(parameters, f"{NAMES[sensor]}_sigma") ** 2 for sensor in used},
+            parameters.gate**2,
         )
+
+    def take_over(
+        self,
+        old: Configuration[NavigationParameters, Design],
+        new: Configuration[NavigationParameters, Design],
+    ) -> None:
+        """Hand the state to another filter; look anew at what is observable."""
+        flight = self._flight
+        if flight is None:
+            return
+        if new.parameters.filter != old.parameters.filter:
+            flight.filter = FILTERS[new.parameters.filter](flight.filter.x, flight.filter.P)
+        if new.parameters.legs != old.parameters.legs:
+            flight.track = Track(new.parameters.legs, flight.track)
+        if new.design.variance != old.design.variance or (
+            new.parameters.observability_window != old.parameters.observability_window
+        ):
+            flight.observability = self._foresee(flight.chief, flight.filter.x)
+            self._tell_blind(flight)
 
     def on_tick(self, measurement: Measurement) -> Estimate | None:
-        """The estimate at the measurement's stamp; none while there is no state to start from."""
-        self.begin_tick(measurement.time)
-        restart = self._filter is None or measurement.time <= self._filter_time
-        if restart and not measurement.fix_available:
+        """The estimate at the measurement's stamp; none for one that is refused, and while there is no
+        state to start from."""
+        acquire = self._acquires(measurement)
+        if acquire is None:
             return None
-        if restart:
-            self._acquire(measurement)
+        if acquire and measurement.time < self._time:
+            self._refusals = Refusals()  # time runs backwards: a new run
+        self.begin_tick(measurement.time)
+        status = EstimateStatus.TRACKING
+        if acquire:
+            flight = self._acquire(measurement)
+            status = EstimateStatus.ACQUIRED
         else:
-            self._predict(measurement)
-        self._filter_time = measurement.time
-        return self._update(measurement, EstimateStatus.ACQUIRED if restart else EstimateStatus.TRACKING)
+            assert self._flight is not None
+            flight = self._flight
+            self._predict(flight, measurement)
+            if not sound(flight.filter.x, flight.filter.P):
+                self._give_up(measurement.time, "prediction not finite")
+                return None
+        estimate = self._update(flight, measurement, status)
+        for text in self._refusals.news():
+            self.record(measurement.time, "refused", text)
+        return estimate
 
-    def _acquire(self, measurement: Measurement) -> None:
+    def _acquires(self, measurement: Measurement) -> bool | None:
+        """Whether to start from the measurement's fix, or to go on; None: it is not to be used at all."""
+        refuse = self._refusals.add
+        if measurement.deputy not in ("", self._deputy):
+            refuse(Refusal.WRONG_DEPUTY, "measurement", f"of {measurement.deputy}")
+            return None
+        fix = False
+        if measurement.fix_available:
+            fix = credible_chief(measurement.chief_state) and credible_fix(
+                measurement.fix, measurement.chief_state
+            )
+            if not fix:
+                refuse(Refusal.FIX, "acquisition fix")
+        flight = self._flight
+        if flight is None:
+            return True if fix else None
+        gap = measurement.time - flight.time
+        if gap == 0:
+            refuse(Refusal.DUPLICATE, "measurement")
+            return None
+        if gap < 0 or gap > self.parameters.longest_gap * NANOSECONDS:
+            if fix:
+                return True
+            refuse(Refusal.OUT_OF_ORDER if gap < 0 else Refusal.FUTURE, "measurement")
+            return None
+        return False
+
+    def _acquire(self, measurement: Measurement) -> Flight:
         parameters = self.parameters
-        self._filter = RelativeFilter(measurement.fix, measurement.chief_state)
-        self._filter.P = np.diag(
+        covariance = np.diag(
             np.repeat([parameters.fix_position_sigma**2, parameters.fix_velocity_sigma**2], 3)
         )
+        mass = measurement.mass if _can_weigh(measurement.mass) else 1.0
+        self._flight = flight = Flight(
+            filter=FILTERS[parameters.filter](np.array(measurement.fix), covariance),
+            time=measurement.time,
+            chief=measurement.chief_state,
+            mass=mass,
+            track=Track(parameters.legs),
+            screen=Screen(self._refusals),
+            observability=self._foresee(measurement.chief_state, measurement.fix),
+            told=measurement.chief_state,
+            last_reading=measurement.time,
+        )
         self.record(measurement.time, "acquired", "filter started from an acquisition fix")
+        self._tell_blind(flight)
+        return flight
 
-    def _predict(self, measurement: Measurement) -> None:
-        assert self._filter is not None
-        self._filter.Q = self.configuration.design.process
-        tick_ns = self.parameters.tick_ns
-        tick = tick_ns / NANOSECONDS
+    def _foresee(self, chief: Vector, state: Vector) -> Observability:
+        window = self.parameters.observability_window or orbit_period(chief)
+        return Observability(
+            chief, state, self.configuration.design.variance, window, self.parameters.mean_motion
+        )
+
+    def _tell_blind(self, flight: Flight) -> None:
+        words = flight.observability.words
+        self.record(
+            flight.time, "observability", f"blind direction: {words}" if words else "everything is observable"
+        )
+
+    def _predict(self, flight: Flight, measurement: Measurement) -> None:
+        """Fly to the measurement's stamp, through ticks that never arrived on the way."""
+        tick = self.parameters.tick_ns
+        gap = measurement.time - flight.time
         # Ticks that never arrived were missed ones: no thrust, and the chief flew on as the model says.
-        for _ in range((measurement.time - self._filter_time) // tick_ns - 1):
-            chief, _ = advance_with_transition(self._filter.chief_state, np.zeros(3), tick, 1)
-            self._filter.fly(chief, np.zeros(3), tick)
-        self._filter.fly(measurement.chief_state, measurement.applied_force / measurement.mass, tick)
+        while gap > tick:
+            self._fly(flight, _UNKNOWN, _NO_ACCELERATION, tick)
+            gap -= tick
+        self._fly(flight, measurement.chief_state, self._acceleration(flight, measurement), gap)
+        self._watch_chief(flight, measurement)
 
-    def _update(self, measurement: Measurement, status: EstimateStatus) -> Estimate:
-        ekf = self._filter
-        assert ekf is not None
+    def _fly(self, flight: Flight, told: Vector, acceleration: Vector, duration_ns: int) -> None:
+        design, duration = self.configuration.design, duration_ns / NANOSECONDS
+        chief, flight.chief_known = _follow(flight.chief, told, duration)
+        leg = Leg(flight.chief, chief, acceleration, duration)
+        whole = duration_ns == self.parameters.tick_ns
+        noise = design.noise if whole else process_noise(self.parameters.acceleration_density, duration)
+        transition = flight.filter.fly(design.process, leg, noise)
+        flight.track.add(leg)
+        flight.chief = chief
+        flight.time += duration_ns
+        words = flight.observability.words
+        if flight.observability.fly(transition, duration) and flight.observability.words != words:
+            self._tell_blind(flight)
+
+    def _acceleration(self, flight: Flight, measurement: Measurement) -> Vector:
+        """Of the thrust over the tick that has ended; none where it is not known."""
+        if not _can_weigh(measurement.mass):
+            self._refusals.add(Refusal.AVIONICS, "mass")
+        else:
+            flight.mass = measurement.mass
+        force = measurement.applied_force
+        x, y, z = force.tolist()
+        if not isfinite(x + y + z):
+            self._refusals.add(Refusal.AVIONICS, "applied force")
+            return _NO_ACCELERATION
+        acceleration: Vector = force / flight.mass
+        return acceleration
+
+    def _watch_chief(self, flight: Flight, measurement: Measurement) -> None:
+        """Refuse an ephemeris that jumped, unless it has gone on from where it jumped to as an orbit does."""
+        told, flight.told = flight.told, measurement.chief_state
+        if flight.chief_known:
+            return
+        if (
+            credible_chief(told)
+            and credible_chief(flight.told)
+            and _follow(told, flight.told, self.parameters.tick)[1]
+        ):
+            state = kernels.relative_to(flight.chief, flight.filter.x, flight.told)
+            flight.filter = FILTERS[self.parameters.filter](state, flight.filter.P)
+            flight.chief, flight.chief_known = flight.told, True
+            self.record(flight.time, "chief", "ephemeris goes on from elsewhere: taken up again")
+            return
+        self._refusals.add(Refusal.CHIEF, "chief ephemeris")
+
+    def _update(self, flight: Flight, measurement: Measurement, status: EstimateStatus) -> Estimate | None:
+        used: list[int] = []
         innovation: list[float] = []
         sigma: list[float] = []
         nis = 0.0
         if measurement.sensor:
-            variance = self.configuration.design.variance
-            predicted, inertial_jacobian = predicted_readings(
-                measurement.sensor, inertial_from_relative(measurement.chief_state, ekf.x)
+            readings = flight.screen.admit(
+                measurement,
+                self.configuration.design.variance,
+                self.parameters.latest,
+                flight.chief,
+                flight.track,
             )
-            jacobian = inertial_jacobian @ hill_transform_inverse(measurement.chief_state)
-            ekf.update(
-                np.array(measurement.reading),
-                lambda _: jacobian,
-                lambda _: predicted,
-                R=np.diag([variance[sensor] for sensor in measurement.sensor]),
-            )
-            ekf.P = 0.5 * (ekf.P + ekf.P.T)  # rounding must not pile up over a long flight
-            innovation = ekf.y.tolist()
-            sigma = np.sqrt(np.diag(ekf.S)).tolist()
-            nis = float(ekf.y @ ekf.SI @ ekf.y)
+            if readings is not None:
+                before = flight.filter.x, flight.filter.P
+                passed, offset, variance = self._weigh(flight, readings)
+                if passed.any():
+                    chosen = readings.select(passed)
+                    flight.observability.take(chosen.expected(flight.filter.x)[1], chosen.variance)
+                    used = chosen.sensor.tolist()
+                    innovation, sigma = offset[passed].tolist(), np.sqrt(variance[passed]).tolist()
+                    nis = flight.filter.correct(passed, self._pseudo(chosen))
+                    flight.last_reading = flight.time
+                if not (sound(flight.filter.x, flight.filter.P) and isfinite(nis)):
+                    flight.filter = FILTERS[self.parameters.filter](*before)
+                    self._give_up(measurement.time, "update not finite")
+                    return None
+                verdict, factor = flight.consistency.judge(nis, len(used), len(passed) - len(used))
+                if verdict is Verdict.GIVE_UP:
+                    self._give_up(measurement.time, "readings contradict the state, however uncertain")
+                    return None
+                if verdict is Verdict.INFLATE:
+                    if measurement.fix_available and credible_fix(measurement.fix, flight.chief):
+                        return self._update(self._acquire(measurement), measurement, EstimateStatus.ACQUIRED)
+                    flight.filter.P = flight.filter.P * factor
+                    self.record(measurement.time, "diverged", f"covariance inflated by {factor:.3g}")
+                    status = EstimateStatus.DIVERGED
+        if status is EstimateStatus.TRACKING:
+            if not flight.chief_known:
+                status = EstimateStatus.CHIEF_LOST
+            elif flight.time - flight.last_reading > self.parameters.coasting_after * NANOSECONDS:
+                status = EstimateStatus.COASTING
         return Estimate(
             time=measurement.time,
-            relative_state=ekf.x,
-            covariance=ekf.P,
-            chief_state=measurement.chief_state,
-            mass=measurement.mass,
+            relative_state=flight.filter.x,
+            covariance=flight.filter.P,
+            chief_state=flight.chief,
+            mass=flight.mass,
             eclipse=measurement.eclipse,
-            sensor=list(measurement.sensor),
+            sensor=used,
             innovation=innovation,
             innovation_sigma=sigma,
             nis=nis,
             status=int(status),
+            refusals=self._refusals.counts,
+            blind_direction=flight.observability.direction,
+            blind=flight.observability.words,
         )
+
+    def _weigh(self, flight: Flight, readings: Readings) -> tuple[np.ndarray, Vector, Vector]:
+        """Which readings pass the gate, their innovations and the variances of these."""
+        offset, variance = flight.filter.weigh(readings)
+        with np.errstate(over="ignore", invalid="ignore"):
+            passed = offset * offset <= self.configuration.design.gate * variance
+        if not passed.all():
+            for index in np.flatnonzero(~passed):
+                name = NAMES[Sensor(int(readings.sensor[index]))]
+                if isfinite(offset[index] + variance[index]):
+                    off = abs(offset[index]) / sqrt(variance[index])
+                    self._refusals.add(Refusal.GATE, name, f"{off:.1f} standard deviations off")
+                else:
+                    self._refusals.add(Refusal.NO_DIRECTION, name)
+        return passed, offset, variance
+
+    def _pseudo(self, readings: Readings) -> bool:
+        three = {int(Sensor.RADIUS), int(Sensor.RANGE_RATE), int(Sensor.LATITUDE)}
+        return (
+            self.parameters.pseudo_measurements
+            and three <= set(readings.sensor.tolist())
+            and not readings.age.any()
+        )
+
+    def _give_up(self, time: int, why: str) -> None:
+        """Lose the state: without an estimate the tick is missed, and the next measurement has a fix."""
+        self._flight = None
+        self.record(time, "lost", f"{why}: waiting for an acquisition fix")
+
+
+def _follow(chief: Vector, told: Vector, duration: float) -> tuple[Vector, bool]:
+    """The chief after a duration, s: as told if that is credible, and whether it is."""
+    share = min(1.0, duration)
+    followed: tuple[Vector, bool] = kernels.follow(
+        chief, told, duration, substeps(duration), CHIEF_DISTANCE * share, CHIEF_SPEED * share
+    )
+    return followed
+
+
+def _can_weigh(mass: float) -> bool:
+    return isfinite(mass) and mass > 0.0

@@ -14,7 +14,6 @@ from formation_gnc.orbit.frames import hill_rotation, inertial_from_relative, re
 from formation_gnc.orbit.propagation import Propagator
 from formation_gnc.parameters import parameter, per_name
 from formation_gnc.plant.sensors import Sensors, SensorSuite
-from formation_gnc.randomness import generator
 
 LONGEST_STEP = 10.0
 """Integration step (s) above which a tick is divided: of order eight, it keeps an orbit in LEO below 1 mm."""
@@ -100,25 +99,17 @@ class Plant:
         self._states = np.array(
             [chief, *(inertial_from_relative(chief, np.array(deputy.relative_state)) for deputy in deputies)]
         )
-        for name, radius in zip(
-            ("chief", *self._names), np.linalg.norm(self._states[:, :3], axis=1), strict=True
-        ):
+        for name, radius in zip(self._names, np.linalg.norm(self._states[1:, :3], axis=1), strict=True):
             if radius < EARTH_RADIUS:
                 raise ConfigurationError(
-                    f"{name}: a start at radius {radius:.6g} m is not allowed; "
-                    f"it must be at least {EARTH_RADIUS:g} m"
+                    f"{name}: it starts at radius {radius:.6g} m, and must be above {EARTH_RADIUS:g} m"
                 )
         self._masses = [deputy.mass for deputy in deputies]
         self._limits = [np.array(deputy.thrust_limit) for deputy in deputies]
         self._forces = [np.zeros(3) for _ in deputies]
         self._missed = [True for _ in deputies]
         self._sensors = [
-            Sensors(
-                deputy.sensors,
-                parameters.tick_ns,
-                generator(parameters.seed, f"{name}/sensors"),
-                generator(parameters.seed, f"{name}/fixes"),
-            )
+            Sensors(deputy.sensors, parameters.tick_ns, parameters.seed, name)
             for name, deputy in zip(self._names, deputies, strict=True)
         ]
         self._propagator = Propagator(parameters.tick, substeps=max(1, round(parameters.tick / LONGEST_STEP)))
@@ -142,19 +133,20 @@ class Plant:
             state, force, mass = self._states[index + 1], self._forces[index], self._masses[index]
             relative = relative_from_inertial(chief, state)
             truth.deputies.append(SatelliteTruth(name, state, relative, force, mass, False))
-            sensors, readings = self._sensors[index].readings(self.tick, state)
+            sensors, readings, ages = self._sensors[index].readings(self.tick, state, chief)
             missed = self._missed[index]
             measurements[name] = Measurement(
                 time=self.time,
                 chief_state=chief,
                 sensor=sensors,
                 reading=readings,
-                age=[0.0] * len(sensors),
+                age=ages,
                 applied_force=force,
                 mass=mass,
                 eclipse=False,
                 fix_available=missed,
                 fix=self._sensors[index].fix(relative) if missed else np.zeros(6),
+                deputy=name,
             )
         return truth, measurements
 

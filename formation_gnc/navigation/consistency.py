@@ -1,0 +1,72 @@
+"""Whether the filter still agrees with its readings."""
+
+from collections import deque
+from enum import Enum
+from functools import cache
+
+from scipy.stats import chi2
+
+WINDOW = 20
+"""Updates over which the normalised innovations are summed."""
+
+FALSE_ALARM = 1e-7
+"""Probability that a consistent filter is called diverged by one window."""
+
+INFLATION = 10.0
+"""By which the covariance is multiplied when the gates refuse most readings, again and again until they
+open."""
+
+UPDATES_TO_DIVERGE = 5
+"""Updates in a row in which the gates refuse most readings, after which the covariance is inflated."""
+
+INFLATIONS = 6
+"""Inflations in a row after which the state is given up: the standard deviation is then a thousand times
+what it was."""
+
+
+class Verdict(Enum):
+    """What is to be done."""
+
+    FINE = "fine"
+    INFLATE = "inflate"
+    GIVE_UP = "give up"
+
+
+class Consistency:
+    """Detects divergence in two ways: readings refused by the gates, and those taken being too far off in
+    sum."""
+
+    def __init__(self) -> None:
+        """Without a history."""
+        self._window: deque[tuple[float, int]] = deque(maxlen=WINDOW)
+        self._refused = 0
+
+    def judge(self, nis: float, taken: int, refused: int) -> tuple[Verdict, float]:
+        """After an update.
+
+        Args:
+            nis: normalised innovation squared of the readings taken.
+            taken: how many these are.
+            refused: how many the gates refused.
+
+        Returns:
+            What is to be done, and by which factor to inflate the covariance.
+        """
+        if refused > taken:
+            self._refused += 1
+            inflations = self._refused - UPDATES_TO_DIVERGE
+            if inflations < 0:
+                return Verdict.FINE, 1.0
+            return (Verdict.GIVE_UP if inflations >= INFLATIONS else Verdict.INFLATE), INFLATION
+        self._refused = 0
+        self._window.append((nis, taken))
+        total, freedom = sum(each for each, _ in self._window), sum(count for _, count in self._window)
+        if len(self._window) < WINDOW or total <= _bound(freedom):
+            return Verdict.FINE, 1.0
+        self._window.clear()
+        return Verdict.INFLATE, total / freedom
+
+
+@cache
+def _bound(freedom: int) -> float:
+    return float(chi2.isf(FALSE_ALARM, freedom))

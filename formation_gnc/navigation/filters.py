@@ -1,0 +1,136 @@
+"""The filters to choose from: FilterPy's, over the relative state in the Hill frame."""
+
+from collections.abc import Callable
+from math import sqrt
+from typing import Protocol
+
+import numpy as np
+from filterpy.kalman import (
+    ExtendedKalmanFilter,
+    JulierSigmaPoints,
+    UnscentedKalmanFilter,
+    unscented_transform,
+)
+
+from formation_gnc.interface import Matrix, Vector
+from formation_gnc.navigation import kernels
+from formation_gnc.navigation.measurement import Readings, pseudo_jacobian, pseudo_measurements
+from formation_gnc.navigation.process import Leg, ProcessModel
+
+
+class RelativeFilter(Protocol):
+    """What the navigator asks of a filter. Within a tick: `fly`, then `weigh`, then `correct`."""
+
+    x: Vector
+    """(6,) relative state."""
+    P: Matrix
+    """(6, 6) its covariance."""
+
+    def fly(self, process: ProcessModel, leg: Leg, noise: Matrix) -> Matrix:
+        """Predict to the end of the leg; returns the transition matrix (6, 6)."""
+
+    def weigh(self, readings: Readings) -> tuple[Vector, Vector]:
+        """Innovations (k,) of readings and their predicted variances (k,), each for itself."""
+
+    def correct(self, chosen: np.ndarray, pseudo: bool) -> float:
+        """Take those of the weighed readings for which the mask (k,) holds, and return their NIS.
+
+        pseudo: as Neokleous' pseudo-measurements, with their noise to first order.
+        """
+
+
+class ExtendedFilter(ExtendedKalmanFilter):  # type: ignore[misc]
+    """FilterPy's extended Kalman filter: nonlinear prediction, Joseph form."""
+
+    def __init__(self, state: Vector, covariance: Matrix) -> None:
+        """Start from a relative state (6,) and its covariance (6, 6)."""
+        super().__init__(dim_x=6, dim_z=3)
+        self.x, self.P = state, covariance
+
+    def fly(self, process: ProcessModel, leg: Leg, noise: Matrix) -> Matrix:
+        """Take state and covariance from the process model, which has computed F P F' + Q on the way."""
+        self.x, self.P, self.F = process.predict(leg, self.x, self.P, noise)
+        return self.F
+
+    def weigh(self, readings: Readings) -> tuple[Vector, Vector]:
+        """Linearise at the predicted state."""
+        expected, jacobian = readings.expected(self.x)
+        self._weighed = readings, readings.innovation(expected), expected, jacobian
+        return self._weighed[1], np.einsum("ij,jk,ik->i", jacobian, self.P, jacobian) + readings.variance
+
+    def correct(self, chosen: np.ndarray, pseudo: bool) -> float:
+        """FilterPy's update with what was linearised."""
+        readings, innovation, expected, jacobian = self._weighed
+        noise = np.diag(readings.variance[chosen])
+        innovation, jacobian = innovation[chosen], jacobian[chosen]
+        if pseudo:
+            sensor, expected = readings.sensor[chosen], expected[chosen]
+            radius = sqrt(readings.chief[:3] @ readings.chief[:3])
+            slope = pseudo_jacobian(sensor, expected)
+            innovation = pseudo_measurements(sensor, expected + innovation, radius) - pseudo_measurements(
+                sensor, expected, radius
+            )
+            jacobian, noise = slope @ jacobian, slope @ noise @ slope.T
+            scale = np.sqrt(np.diag(noise))  # their units differ by fourteen orders of magnitude in variance
+            innovation, jacobian = innovation / scale, jacobian / scale[:, None]
+            noise = noise / np.outer(scale, scale)
+        self.update(innovation, lambda _: jacobian, lambda _: 0.0, R=noise)
+        self.P, _ = kernels.settle(self.P)
+        return float(self.y @ self.SI @ self.y)
+
+
+class UnscentedFilter(UnscentedKalmanFilter):  # type: ignore[misc]
+    """FilterPy's unscented Kalman filter on twelve points of equal weight.
+
+    Weights that are all positive keep the predicted covariance positive definite, and points a whole sigma
+    and more away lose nothing to the rounding of coordinates of 7000 km, as points close by would.
+    """
+
+    def __init__(self, state: Vector, covariance: Matrix) -> None:
+        """Start from a relative state (6,) and its covariance (6, 6)."""
+        super().__init__(6, 3, 1.0, hx=None, fx=None, points=JulierSigmaPoints(6, kappa=0.0))
+        self.x, self.P = state, covariance
+
+    def fly(self, process: ProcessModel, leg: Leg, noise: Matrix) -> Matrix:
+        """Move the points; the transition matrix is that of the mean."""
+        *_, transition = process.predict(leg, self.x, self.P, noise)
+        self.sigmas_f = process.move(leg, self.points_fn.sigma_points(self.x, self.P))
+        self.x, covariance = unscented_transform(self.sigmas_f, self.Wm, self.Wc, noise)
+        self.P, _ = kernels.settle(covariance)
+        return transition
+
+    def weigh(self, readings: Readings) -> tuple[Vector, Vector]:
+        """Read at the points of the prediction."""
+        self.sigmas_f = self.points_fn.sigma_points(self.x, self.P)
+        expected = np.array([readings.expected(point)[0] for point in self.sigmas_f])
+        innovation = readings.innovation(expected)  # by point: small numbers, and angles without a seam
+        mean = self.Wm @ innovation
+        self._weighed = readings, innovation
+        return mean, self.Wc @ (innovation - mean) ** 2 + readings.variance
+
+    def correct(self, chosen: np.ndarray, pseudo: bool) -> float:
+        """FilterPy's update with what the points read."""
+        readings, innovation = self._weighed
+        noise = np.diag(readings.variance[chosen])
+        read = -innovation[:, chosen]
+        if pseudo:
+            sensor, reading = readings.sensor[chosen], readings.value[chosen]
+            radius = sqrt(readings.chief[:3] @ readings.chief[:3])
+            slope = pseudo_jacobian(sensor, reading)
+            read = pseudo_measurements(sensor, reading + read, radius) - pseudo_measurements(
+                sensor, reading, radius
+            )
+            noise = slope @ noise @ slope.T
+            scale = np.sqrt(np.diag(noise))
+            read, noise = read / scale, noise / np.outer(scale, scale)
+        points = iter(read)
+        self.update(np.zeros(read.shape[1]), R=noise, hx=lambda _: next(points))
+        self.P, _ = kernels.settle(self.P)
+        return float(self.y @ self.SI @ self.y)
+
+
+FILTERS: dict[str, Callable[[Vector, Matrix], RelativeFilter]] = {
+    "ekf": ExtendedFilter,
+    "ukf": UnscentedFilter,
+}
+"""The filters to choose from, by name."""

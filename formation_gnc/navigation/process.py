@@ -1,0 +1,127 @@
+"""How the filter believes the deputy moves between two ticks."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from math import ceil
+
+import numpy as np
+
+from formation_gnc.interface import Matrix, Vector
+from formation_gnc.mission import Mission
+from formation_gnc.navigation import kernels
+from formation_gnc.orbit.elements import Elements
+from formation_gnc.relative.hill import HarmonicModel, HillModel
+from formation_gnc.relative.schweighart_sedwick import CircularReference, SchweighartSedwickModel
+
+LONGEST_STEP = 10.0
+"""Integration step (s) above which a flight is divided, as in the plant."""
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """A flight of the deputy beside the chief."""
+
+    chief: Vector
+    """(6,) the chief's inertial state at its start, m and m/s."""
+    next_chief: Vector
+    """(6,) the same at its end."""
+    acceleration: Vector
+    """(3,) by thrust, along the Hill axes at the start, m/s^2."""
+    duration: float
+    """s."""
+
+
+class ProcessModel(ABC):
+    """Moves relative states along a leg."""
+
+    @abstractmethod
+    def predict(
+        self, leg: Leg, state: Vector, covariance: Matrix, noise: Matrix
+    ) -> tuple[Vector, Matrix, Matrix]:
+        """State (6,), covariance with `noise` added (6, 6), and transition matrix (6, 6)."""
+
+    @abstractmethod
+    def move(self, leg: Leg, points: Matrix) -> Matrix:
+        """Several relative states, (N, 6), alike."""
+
+
+class NonlinearProcess(ProcessModel):
+    """Two-body motion with J2 of both satellites: neither a circular chief nor a small separation is
+    assumed."""
+
+    def predict(
+        self, leg: Leg, state: Vector, covariance: Matrix, noise: Matrix
+    ) -> tuple[Vector, Matrix, Matrix]:
+        """In one kernel, the transition by the variational equations."""
+        moved: tuple[Vector, Matrix, Matrix] = kernels.fly(
+            leg.chief,
+            leg.next_chief,
+            state,
+            covariance,
+            noise,
+            leg.acceleration,
+            leg.duration,
+            substeps(leg.duration),
+        )
+        return moved
+
+    def move(self, leg: Leg, points: Matrix) -> Matrix:
+        """Each in the inertial frame."""
+        moved: Matrix = kernels.fly_points(
+            leg.chief, leg.next_chief, points, leg.acceleration, leg.duration, substeps(leg.duration)
+        )
+        return moved
+
+
+class LinearProcess(ProcessModel):
+    """A time-invariant linear model about the chief's orbit at the start of the run, in closed form.
+
+    What it leaves out (eccentricity, curvature, the turning of the thrust in the Hill frame over a tick)
+    has to be covered by the process noise.
+    """
+
+    def __init__(self, model: HarmonicModel) -> None:
+        """With the model's own transition matrices."""
+        self._discretise = lru_cache(maxsize=64)(lambda duration: model.discretise(0.0, duration))
+
+    def predict(
+        self, leg: Leg, state: Vector, covariance: Matrix, noise: Matrix
+    ) -> tuple[Vector, Matrix, Matrix]:
+        """x = Phi x + Gamma a."""
+        phi, gamma = self._discretise(leg.duration)
+        return phi @ state + gamma @ leg.acceleration, kernels.spread(phi, covariance, noise), phi
+
+    def move(self, leg: Leg, points: Matrix) -> Matrix:
+        """The same for several."""
+        phi, gamma = self._discretise(leg.duration)
+        moved: Matrix = points @ phi.T + gamma @ leg.acceleration
+        return moved
+
+
+def substeps(duration: float) -> int:
+    """Integration steps for a flight of a duration, s, of either sign."""
+    return max(1, ceil(abs(duration) / LONGEST_STEP))
+
+
+def process_noise(density: float, duration: float) -> Matrix:
+    """(6, 6) covariance that white acceleration of a density (m^2/s^3, each axis) adds over a duration, s.
+
+    That of a double integrator: over a tick, orbital motion changes it by a part in (n t)^2.
+    """
+    unit = np.eye(3)
+    cubic, square = duration**3 / 3.0 * unit, duration**2 / 2.0 * unit
+    return density * np.block([[cubic, square], [square, duration * unit]])
+
+
+def _reference(mission: Mission) -> CircularReference:
+    return CircularReference.of(Elements(**vars(mission.chief)))
+
+
+PROCESS_MODELS: dict[str, Callable[[Mission], ProcessModel]] = {
+    "nonlinear_j2": lambda mission: NonlinearProcess(),
+    "schweighart_sedwick": lambda mission: LinearProcess(SchweighartSedwickModel(_reference(mission))),
+    "hill": lambda mission: LinearProcess(HillModel(mission.mean_motion)),
+}
+"""The models to choose from, by name."""

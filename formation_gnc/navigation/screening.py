@@ -1,0 +1,129 @@
+"""What comes in is checked here before the filter sees it, and what is refused is counted by reason."""
+
+from math import isfinite
+
+import numpy as np
+
+from formation_gnc.interface import NANOSECONDS, Counts, Matrix, Measurement, Refusal, Sensor, Vector
+from formation_gnc.navigation.measurement import NAMES, Readings, Track
+from formation_gnc.orbit.constants import EARTH_RADIUS
+
+WORDS = {reason: reason.name.lower().replace("_", " ") for reason in Refusal}
+
+_KNOWN = frozenset(int(sensor) for sensor in Sensor)
+
+
+class Refusals:
+    """Counts of what was refused since the start of the run, and the news of them."""
+
+    def __init__(self) -> None:
+        """Nothing yet."""
+        self.counts: Counts = np.zeros(len(Refusal), dtype=np.uint32)
+        self._seen: dict[str, int] = {}
+        self._news: list[str] = []
+
+    def add(self, reason: Refusal, what: str, detail: str = "") -> None:
+        """Count a refusal of something, such as a sensor's reading; the 1st, 10th, 100th ... of a kind is
+        news."""
+        self.counts = self.counts.copy()  # an estimate already holds the old one
+        self.counts[reason] += 1
+        subject = f"{what}: {WORDS[reason]}"
+        self._seen[subject] = seen = self._seen.get(subject, 0) + 1
+        if str(seen).strip("0") == "1":
+            text = f"{subject}, {detail}" if detail else subject
+            self._news.append(text if seen == 1 else f"{text} ({seen} by now)")
+
+    def news(self) -> list[str]:
+        """What there is to tell since it was last asked for."""
+        news, self._news = self._news, []
+        return news
+
+
+class Screen:
+    """Checks readings, each for itself, before any of them is compared with the state."""
+
+    def __init__(self, refusals: Refusals) -> None:
+        """Remember no reading yet."""
+        self._refusals = refusals
+        self._taken: dict[int, list[int]] = {}
+
+    def admit(
+        self, measurement: Measurement, variance: dict[int, float], latest: float, chief: Vector, track: Track
+    ) -> Readings | None:
+        """The readings that are what they should be; none when there are none.
+
+        Args:
+            measurement: with readings.
+            variance: by sensor in use; readings of others are left out.
+            latest: age (s) above which a reading is refused.
+            chief: inertial state now, (6,).
+            track: the legs that led here.
+        """
+        sensors: list[int] = []
+        values: list[float] = []
+        ages: list[float] = []
+        count = len(measurement.sensor)
+        if len(measurement.reading) != count or len(measurement.age) != count:
+            self._refusals.add(Refusal.NOT_FINITE, "readings", "a value or age is missing")
+            return None
+        for sensor, value, age in zip(measurement.sensor, measurement.reading, measurement.age, strict=True):
+            if sensor in variance:
+                reason = self._fault(measurement.time, sensor, value, age, latest)
+                if reason is None:
+                    sensors.append(sensor)
+                    values.append(value)
+                    ages.append(age)
+                else:
+                    self._refusals.add(reason, NAMES[Sensor(sensor)])
+            elif sensor not in _KNOWN:
+                self._refusals.add(Refusal.UNKNOWN_SENSOR, f"sensor {sensor}")
+        if not sensors:
+            return None
+        return Readings(
+            np.array(sensors, dtype=np.int64),
+            np.array(values),
+            np.array(ages),
+            np.array([variance[sensor] for sensor in sensors]),
+            chief,
+            track,
+        )
+
+    def _fault(self, time: int, sensor: int, value: float, age: float, latest: float) -> Refusal | None:
+        if not (isfinite(value) and isfinite(age)):
+            return Refusal.NOT_FINITE
+        if age < 0.0:
+            return Refusal.FUTURE
+        if age > latest:
+            return Refusal.LATE
+        taken = time - round(age * NANOSECONDS)
+        known = self._taken.setdefault(sensor, [])
+        if taken in known:
+            return Refusal.DUPLICATE
+        oldest = time - round(latest * NANOSECONDS)
+        self._taken[sensor] = [each for each in known if each >= oldest]
+        self._taken[sensor].append(taken)
+        return None
+
+
+def credible_fix(fix: Vector, chief: Vector) -> bool:
+    """Whether an acquisition fix (6,) can be one: finite, and not inside the Earth."""
+    place = fix[:3].tolist()
+    place[0] += float(np.sqrt(chief[:3] @ chief[:3]))
+    return all(map(isfinite, fix.tolist())) and sum(each * each for each in place) > EARTH_RADIUS**2
+
+
+def credible_chief(chief: Vector) -> bool:
+    """Whether an inertial state (6,) can be an orbit: finite, above the ground, moving across the radius,
+    and bound."""
+    x, y, z, vx, vy, vz = map(float, chief)
+    if not all(map(isfinite, (x, y, z, vx, vy, vz))):
+        return False
+    square, speed = x * x + y * y + z * z, vx * vx + vy * vy + vz * vz
+    radial = x * vx + y * vy + z * vz
+    across = square * speed - radial * radial
+    return square > EARTH_RADIUS**2 and 1.0 < across < 1e26 and speed < 1.2e4**2
+
+
+def sound(state: Vector, covariance: Matrix) -> bool:
+    """Whether a state and its covariance are finite."""
+    return isfinite(float(state.sum()) + float(covariance.sum()))
