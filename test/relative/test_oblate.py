@@ -144,9 +144,3 @@ def test_bounded_motion_stays_where_that_of_two_bodies_drifts_away():
     assert abs(drift(model.bounded(0.0, state))) < 0.01
     two_bodies = NonlinearModel(KeplerChief.of(elements)).bounded(0.0, state)
     assert abs(drift(two_bodies)) > 0.5
-
-
-def test_kepler_chief_with_j2_is_bounded_by_return_after_one_revolution():
-    model = OblateModel(KeplerChief(7.2e6, 0.01, 0.9, 0.4, 0.5))
-    start = model.bounded(0.0, np.array([100.0, 200.0, -50.0, 0.1, -0.2, 0.05]))
-    assert model.propagate(0.0, start, model.period)[1] == pytest.approx(200.0, abs=1e-8)
