@@ -1,0 +1,1 @@
+"""What the project claims, measured against programs that it did not write; see docs/verification/."""
