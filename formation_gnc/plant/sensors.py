@@ -76,7 +76,7 @@ def read(sensor: Sensor, state: Vector, chief: Vector) -> float:
 
 
 class _Instrument:
-    """One sensor, with a stream of random numbers of its own: nothing about another sensor changes its errors."""
+    """One sensor, with random numbers of its own: nothing about another sensor changes its errors."""
 
     def __init__(self, sensor: Sensor, model: SensorParameters, tick_ns: int, seed: int, deputy: str) -> None:
         name = f"{deputy}.sensors.{sensor.name.lower()}"
@@ -130,9 +130,7 @@ class Sensors:
         """
         suite = [(sensor, getattr(parameters, sensor.name.lower())) for sensor in Sensor]
         self._instruments = [
-            _Instrument(sensor, model, tick_ns, seed, f"{deputy}/sensors")
-            for sensor, model in suite
-            if model.on
+            _Instrument(sensor, model, tick_ns, seed, deputy) for sensor, model in suite if model.on
         ]
         self._fixes = generator(seed, f"{deputy}/fixes")
         self._fix_sigma = np.repeat([parameters.fix_position_sigma, parameters.fix_velocity_sigma], 3)

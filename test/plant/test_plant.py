@@ -1,0 +1,312 @@
+import math
+from copy import deepcopy
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.orbit.constants import EARTH_RADIUS, J2, MU
+from formation_gnc.parameters import load
+from formation_gnc.plant.plant import Plant, PlantParameters
+
+Array = NDArray[np.float64]
+
+AWAY = [10.0, -90.0, 10.0, 0.02, 0.0, -0.01]
+VALUES = {
+    "chief.semi_major_axis": 6978100.0,
+    "chief.eccentricity": 0.01,
+    "chief.inclination": 1.48,
+    "chief.right_ascension": 0.4,
+    "chief.argument_of_perigee": -1.0,
+    "chief.true_anomaly": 2.0,
+    "duration": 6000.0,
+    "deputy1.relative_state": AWAY,
+}
+PUSH = {"deputy1": np.array([0.004, -0.003, 0.002])}
+ROUNDING = 1e-7  # m; a few units in the last place of an orbit's radius
+
+
+def plant(**values: Any) -> Plant:
+    return Plant(
+        load(PlantParameters, VALUES | {name.replace("__", "."): value for name, value in values.items()})
+    )
+
+
+def fly(flown: Plant, ticks: int, forces: dict[str, Array]) -> None:
+    for _ in range(ticks):
+        flown.observe()
+        flown.step(forces)
+
+
+def hill_axes(chief: Array) -> Array:
+    """Rows x, y, z of the Hill frame in inertial components, from their definition."""
+    radial = chief[:3] / np.linalg.norm(chief[:3])
+    normal = np.cross(chief[:3], chief[3:])
+    normal /= np.linalg.norm(normal)
+    return np.array([radial, np.cross(normal, radial), normal])
+
+
+def gravity(position: Array) -> Array:
+    """Point mass with J2, the textbook's three components."""
+    x, y, z = position
+    r = math.sqrt(x * x + y * y + z * z)
+    k, u = 1.5 * J2 * (EARTH_RADIUS / r) ** 2, 5.0 * (z / r) ** 2
+    return (
+        -MU
+        / r**3
+        * np.array([x * (1.0 + k * (1.0 - u)), y * (1.0 + k * (1.0 - u)), z * (1.0 + k * (3.0 - u))])
+    )
+
+
+def integrated(state: Array, duration: float, acceleration: Array) -> Array:
+    """An orbit by SciPy, an order of magnitude more accurate than what is asked of the plant."""
+
+    def rate(_: float, y: Array) -> Array:
+        return np.concatenate([y[3:], gravity(y[:3]) + acceleration])
+
+    solution = solve_ivp(rate, (0.0, duration), state, method="DOP853", rtol=1e-13, atol=1e-5)
+    return np.asarray(solution.y[:, -1])
+
+
+def test_the_deputy_starts_where_it_is_put_relative_to_the_chief() -> None:
+    truth, _ = plant().observe()
+    assert truth.deputies[0].relative_state == pytest.approx(AWAY, abs=ROUNDING)
+    separation = truth.deputies[0].inertial_state[:3] - truth.chief_state[:3]
+    assert hill_axes(truth.chief_state) @ separation == pytest.approx(AWAY[:3], abs=ROUNDING)
+
+
+@pytest.mark.parametrize("tick", [1.0, 60.0])
+def test_an_orbit_is_integrated_to_better_than_a_millimetre(tick: float) -> None:
+    interval = {f"deputy1__sensors__{name}__interval": 60.0 for name in ("radius", "range_rate", "latitude")}
+    flown = plant(tick=tick, **interval)
+    start, _ = flown.observe()
+    orbit = 5820.0  # s; whole ticks, a little over one revolution
+    fly(flown, round(orbit / tick), {"deputy1": np.zeros(3)})
+    end, _ = flown.observe()
+    for before, after in (
+        (start.chief_state, end.chief_state),
+        (start.deputies[0].inertial_state, end.deputies[0].inertial_state),
+    ):
+        true = integrated(before, orbit, np.zeros(3))
+        assert np.linalg.norm(after[:3] - true[:3]) < 1e-3
+        assert np.linalg.norm(after[3:] - true[3:]) < 1e-6  # the same at an orbit's rate
+
+
+def test_a_force_acts_along_the_hill_axes_of_the_start_of_its_tick_on_the_deputy_alone() -> None:
+    flown, free = plant(tick=10.0), plant(tick=10.0)
+    fly(flown, 3, {})
+    fly(free, 3, {})
+    truth, _ = flown.observe()
+    flown.step(PUSH)
+    free.step({})
+    pushed, _ = flown.observe()
+    coasted, _ = free.observe()
+    acceleration = PUSH["deputy1"] / 100.0 @ hill_axes(truth.chief_state)
+    true = integrated(truth.deputies[0].inertial_state, 10.0, acceleration)
+    assert pushed.deputies[0].inertial_state == pytest.approx(true, abs=ROUNDING)
+    assert np.array_equal(pushed.chief_state, coasted.chief_state)
+    gained = pushed.deputies[0].inertial_state[3:] - coasted.deputies[0].inertial_state[3:]
+    impulse = 10.0 * acceleration
+    assert gained == pytest.approx(impulse, abs=2e-4 * np.linalg.norm(impulse))  # gravity's gradient: (n t)^2
+
+
+def test_the_truth_and_the_measurement_report_the_force_of_the_tick_before() -> None:
+    flown = plant()
+    truth, measurements = flown.observe()
+    assert not truth.deputies[0].applied_force.any()
+    assert not measurements["deputy1"].applied_force.any()
+    flown.step(PUSH)
+    truth, measurements = flown.observe()
+    assert truth.deputies[0].applied_force.tolist() == PUSH["deputy1"].tolist()
+    assert measurements["deputy1"].applied_force.tolist() == PUSH["deputy1"].tolist()
+
+
+def test_a_force_beyond_the_limit_is_cut_on_each_axis() -> None:
+    cut, within = plant(deputy1__thrust_limit=[0.01, 0.0, 0.02]), plant()
+    cut.step({"deputy1": np.array([-5.0, 0.003, 0.002])})
+    within.step({"deputy1": np.array([-0.01, 0.0, 0.002])})
+    one, other = cut.observe()[0].deputies[0], within.observe()[0].deputies[0]
+    assert one.applied_force.tolist() == [-0.01, 0.0, 0.002]
+    assert np.array_equal(one.inertial_state, other.inertial_state)
+
+
+def test_without_thrust_mass_does_not_matter_and_with_it_acceleration_is_force_over_mass() -> None:
+    light, heavy = plant(deputy1__mass=50.0), plant(deputy1__mass=200.0)
+    fly(light, 20, {"deputy1": np.zeros(3)})
+    fly(heavy, 20, {"deputy1": np.zeros(3)})
+    assert np.array_equal(
+        light.observe()[0].deputies[0].inertial_state, heavy.observe()[0].deputies[0].inertial_state
+    )
+    light.step({"deputy1": np.array([0.001, 0.0, 0.0])})
+    heavy.step({"deputy1": np.array([0.004, 0.0, 0.0])})
+    assert np.array_equal(
+        light.observe()[0].deputies[0].inertial_state, heavy.observe()[0].deputies[0].inertial_state
+    )
+
+
+@pytest.mark.parametrize(
+    "forces",
+    [
+        {},
+        {"deputy1": np.array([np.nan, 0.0, 0.0])},
+        {"deputy1": np.array([0.0, np.inf, 0.0])},
+        {"deputy1": np.array([0.001, 0.001, -np.inf])},
+        {"somebody": np.zeros(3)},
+    ],
+)
+def test_a_deputy_without_a_finite_answer_coasts_for_the_tick_and_gets_a_fix(
+    forces: dict[str, Array],
+) -> None:
+    missed, coasting = plant(), plant()
+    fly(missed, 5, PUSH)
+    fly(coasting, 5, PUSH)
+    assert missed.step(forces) == ["deputy1"]
+    assert coasting.step({"deputy1": np.zeros(3)}) == []
+    truth, measurements = missed.observe()
+    expected, without = coasting.observe()
+    assert np.array_equal(truth.deputies[0].inertial_state, expected.deputies[0].inertial_state)
+    assert not truth.deputies[0].applied_force.any()
+    measurement = measurements["deputy1"]
+    assert measurement.fix_available
+    # six normal errors of 0.5 m and 0.5 mm/s stay inside six sigma
+    error = (measurement.fix - truth.deputies[0].relative_state) / np.repeat([0.5, 0.0005], 3)
+    assert 0.0 < np.abs(error).max() < 6.0
+    assert not without["deputy1"].fix_available
+    assert not without["deputy1"].fix.any()
+    assert missed.step(PUSH) == []
+    assert not missed.observe()[1]["deputy1"].fix_available
+
+
+def test_the_first_tick_brings_a_fix() -> None:
+    flown = plant()
+    assert flown.observe()[1]["deputy1"].fix_available
+    flown.step(PUSH)
+    assert not flown.observe()[1]["deputy1"].fix_available
+
+
+def test_one_deputy_does_not_feel_another_nor_its_misses() -> None:
+    other = {"deputies": ["deputy1", "deputy2"], "deputy2__relative_state": [0.0, 50.0, 0.0, 0.0, 0.0, 0.0]}
+    alone, together = plant(), plant(**other)
+    for tick in range(30):
+        one, measured_alone = alone.observe()
+        two, measured_together = together.observe()
+        assert np.array_equal(one.deputies[0].inertial_state, two.deputies[0].inertial_state)
+        mine, theirs = measured_alone["deputy1"], measured_together["deputy1"]
+        assert mine.reading == theirs.reading
+        assert mine.fix.tolist() == theirs.fix.tolist()
+        alone.step(PUSH)
+        missed = together.step(PUSH if tick % 3 == 0 else PUSH | {"deputy2": np.zeros(3)})
+        assert missed == (["deputy2"] if tick % 3 == 0 else [])
+
+
+def test_a_miss_does_not_change_the_noise_of_later_readings() -> None:
+    kept, lost = plant(tick=10.0), plant(tick=10.0)
+    noise: dict[str, list[float]] = {"kept": [], "lost": []}
+    for tick in range(20):
+        for name, flown in (("kept", kept), ("lost", lost)):
+            truth, measurements = flown.observe()
+            radius = float(np.linalg.norm(truth.deputies[0].inertial_state[:3]))
+            noise[name].append(measurements["deputy1"].reading[0] - radius)
+        kept.step({"deputy1": np.zeros(3)})
+        lost.step({"deputy1": np.zeros(3)} if tick % 2 else {})
+    assert noise["kept"] == pytest.approx(noise["lost"], abs=ROUNDING)
+
+
+def test_the_same_seed_gives_the_same_bits_and_another_seed_only_other_noise() -> None:
+    first, again, other = plant(seed=3), plant(seed=3), plant(seed=4)
+    for _ in range(25):
+        (truth, measured), (same, measured_again), (same_too, measured_otherwise) = (
+            flown.observe() for flown in (first, again, other)
+        )
+        assert np.array_equal(truth.deputies[0].inertial_state, same.deputies[0].inertial_state)
+        assert np.array_equal(truth.deputies[0].inertial_state, same_too.deputies[0].inertial_state)
+        assert measured["deputy1"].reading == measured_again["deputy1"].reading
+        if measured["deputy1"].reading:
+            assert measured["deputy1"].reading != measured_otherwise["deputy1"].reading
+        for flown in (first, again, other):
+            flown.step(PUSH)
+
+
+def test_what_was_observed_does_not_change_afterwards() -> None:
+    flown = plant()
+    observed = flown.observe()
+    kept = deepcopy(observed)
+    fly(flown, 12, PUSH)
+    assert repr(observed) == repr(kept)
+
+
+@given(ns=st.integers(1, 10**12), tick_ns=st.integers(1, 10**11))
+def test_every_tick_that_begins_within_the_duration_is_flown(ns: int, tick_ns: int) -> None:
+    values = VALUES | {"tick": tick_ns * 1e-9, "duration": ns * 1e-9}
+    if ns < tick_ns:
+        with pytest.raises(ConfigurationError, match="it must be a tick or more"):
+            load(PlantParameters, values)
+    else:
+        ticks = load(PlantParameters, values).ticks
+        assert (ticks - 1) * tick_ns < ns <= ticks * tick_ns
+
+
+def test_a_duration_of_part_ticks_ends_with_the_last_tick_that_began() -> None:
+    flown = plant(tick=2.0, duration=5.0)
+    stamps = []
+    while not flown.finished:
+        stamps.append(flown.observe()[0].time)
+        flown.step({})
+    assert stamps == [0, 2_000_000_000, 4_000_000_000]
+
+
+def refusal(values: dict[str, Any]) -> str:
+    with pytest.raises(ConfigurationError) as raised:
+        Plant(load(PlantParameters, values))
+    return str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("duration", 0.3, "parameter duration: 0.3 s is not allowed; it must be a tick or more"),
+        (
+            "duration",
+            1e300,
+            "parameter duration: 1e+300 is not allowed; it must be above 0, at most 2.14748e+09",
+        ),
+        ("tick", 1e300, "parameter tick: 1e+300 is not allowed; it must be above 0, at most 2.14748e+09"),
+        ("chief.semi_major_axis", 1e300, "parameter chief.semi_major_axis: 1e+300 is not allowed"),
+        ("chief.semi_major_axis", 6e6, "perigee radius is 5940000.0 m: it must be at least the Earth's"),
+        ("deputy1.relative_state", [-1e6] + [0] * 5, "deputy1: it starts at radius 6."),
+        (
+            "deputy1.relative_state",
+            [1e200] + [0] * 5,
+            "parameter deputy1.relative_state: 1e+200 is not allowed",
+        ),
+        (
+            "deputy1.sensors.range_rate.interval",
+            1.5,
+            "parameter deputy1.sensors.range_rate.interval: 1.5 s is not allowed; "
+            "it must be a whole number of ticks of 1 s",
+        ),
+    ],
+)
+def test_what_cannot_be_flown_is_refused_in_words(name: str, value: Any, words: str) -> None:
+    assert refusal(VALUES | {name: value}).startswith(words)
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        ([], "[] is not allowed; it must be one or more different names"),
+        (["a", "a"], "['a', 'a'] is not allowed; it must be one or more different names"),
+        (["a b"], "'a b' is not allowed; a name has letters, digits and _ only"),
+        (["1st"], "'1st' is not allowed; a name has letters, digits and _ only"),
+        (["é"], "'é' is not allowed; a name has letters, digits and _ only"),
+    ],
+)
+def test_names_of_deputies_are_different_and_fit_for_namespaces(names: list[str], words: str) -> None:
+    values = {name: value for name, value in VALUES.items() if not name.startswith("deputy1")}
+    states = {f"{name}.relative_state": AWAY for name in names}
+    assert refusal(values | states | {"deputies": names}) == f"parameter deputies: {words}"
