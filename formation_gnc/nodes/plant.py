@@ -13,7 +13,7 @@ from rosgraph_msgs.msg import Clock
 from formation_gnc.interface import NANOSECONDS, Event, Measurement, Thrust, Truth, Vector
 from formation_gnc.nodes import topics
 from formation_gnc.nodes.conversion import from_message, message_type, to_message
-from formation_gnc.nodes.shell import STOP, ConfiguredNode, run, spin
+from formation_gnc.nodes.shell import STOP, ConfiguredNode, run
 from formation_gnc.plant.plant import Plant, PlantParameters
 
 PARTS = ("navigation", "guidance", "controller")
@@ -121,8 +121,8 @@ class PlantNode(ConfiguredNode):
         if name in self._forces:
             return f"commanded {self._forces[name].tolist()} N"
         absent = [node for node in self._missing() if node.startswith(f"/{name}/")]
-        where = f"{', '.join(absent)} not there" if absent else "all its nodes are there"
-        return f"did not answer within {self.values.deadline:g} s ({where})"
+        where = f" ({', '.join(absent)} not there)" if absent else ""  # a killed node is missed by DDS only later
+        return f"did not answer within {self.values.deadline:g} s{where}"
 
     def _publish_tick(self) -> None:
         self._forces = {}
@@ -217,14 +217,14 @@ class PlantNode(ConfiguredNode):
 
 def fly(node: PlantNode) -> None:
     """Fly the run to its end, and see the recorder through."""
-    spin(node, (node.done, STOP), node.check, lambda: node.period)
+    node.spin((node.done, STOP), node.check, lambda: node.period)
     recorded = Future()
 
     def check() -> None:
         if not node.wait_for_recorder():
             recorded.set_result(None)
 
-    spin(node, (recorded, STOP), check, lambda: CHECK_PERIOD)
+    node.spin((recorded, STOP), check, lambda: CHECK_PERIOD)
 
 
 def main() -> int:

@@ -21,7 +21,7 @@ from rosgraph_msgs.msg import Clock
 from formation_gnc.interface import NANOSECONDS
 from formation_gnc.mission import Mission
 from formation_gnc.nodes import topics
-from formation_gnc.nodes.shell import ConfiguredNode, run, spin
+from formation_gnc.nodes.shell import ConfiguredNode, run
 from formation_gnc.parameters import parameter
 from formation_gnc.recording.provenance import provenance
 from formation_gnc.recording.writer import FLUSH_INTERVAL, BagWriter
@@ -162,8 +162,8 @@ def record(node: RecorderNode) -> None:
     """Record until told to stop, and then until nothing more comes."""
     quiet = Future()
     try:
-        spin(node)
-        spin(node, (quiet,), lambda: node.is_quiet() and quiet.set_result(None))
+        node.spin()
+        node.spin((quiet,), lambda: node.is_quiet() and quiet.set_result(None))
     finally:
         node.close()
 

@@ -48,6 +48,10 @@ OWN_OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides")
 """Parameters that every ROS node has, or may be given, besides its schema."""
 
 
+STOP = Future()
+"""Done when the process has been asked to stop, by SIGINT or SIGTERM."""
+
+
 class ConfiguredNode(Node):  # type: ignore[misc]
     """A node whose parameters come from a schema.
 
@@ -57,6 +61,7 @@ class ConfiguredNode(Node):  # type: ignore[misc]
 
     def __init__(self, name: str, schema: type, namespace: str = "") -> None:
         """Declare the schema's parameters with the values given on the command line and in parameter files."""
+        self._executor: Any = None
         try:
             super().__init__(
                 name,
@@ -80,11 +85,30 @@ class ConfiguredNode(Node):  # type: ignore[misc]
                 self.undeclare_parameter(leaf.name)
             self.declare_parameter(leaf.name, plain, _descriptor(leaf), ignore_override=True)
 
+    def spin(
+        self,
+        until: Sequence[Future] = (STOP,),
+        check: Callable[[], None] = lambda: None,
+        period: Callable[[], float] = lambda: CHECK_PERIOD,
+    ) -> None:
+        """Work until any of the futures is done; `check` is called every `period` (s) or sooner.
+
+        One executor serves the node for all its life: a message that one has noticed but not handled is lost to the next.
+        """
+        if self._executor is None:
+            self._executor = Executor()
+            self._executor.add_node(self)
+        while not any(future.done() for future in until):
+            self._executor.spin_until_future_complete(until[0], timeout_sec=period())
+            check()
+
     def destroy_node(self) -> None:
         """Leave only when everybody has what was published."""
         deadline = monotonic() + FAREWELL
         for publisher in self.publishers:
             publisher.wait_for_all_acked(Duration(seconds=max(0.0, deadline - monotonic())))
+        if self._executor is not None:
+            self._executor.remove_node(self)
         super().destroy_node()
 
 
@@ -186,28 +210,7 @@ def _answer_from(pool: ThreadPoolExecutor, service: Service) -> None:
     )
 
 
-STOP = Future()
-"""Done when the process has been asked to stop, by SIGINT or SIGTERM."""
-
-
-def spin(
-    node: Node,
-    until: Sequence[Future] = (STOP,),
-    check: Callable[[], None] = lambda: None,
-    period: Callable[[], float] = lambda: CHECK_PERIOD,
-) -> None:
-    """Let a node work until any of the futures is done; `check` is called every `period` (s) or sooner."""
-    executor = Executor()
-    executor.add_node(node)
-    try:
-        while not any(future.done() for future in until):
-            executor.spin_until_future_complete(until[0], timeout_sec=period())
-            check()
-    finally:
-        executor.remove_node(node)
-
-
-def run(make_node: Callable[[], ConfiguredNode], fly: Callable[[Any], None] = spin) -> int:
+def run(make_node: Callable[[], ConfiguredNode], fly: Callable[[Any], None] = ConfiguredNode.spin) -> int:
     """Body of every executable: make the node, let it fly, and end with the exit status.
 
     Signals only set `STOP`, since a node that has been asked to stop still has to hand over what it published or recorded.

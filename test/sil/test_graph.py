@@ -92,8 +92,11 @@ def test_nodes_started_by_hand_in_any_order_fly_and_swap_the_law_in_flight(desk:
     assert detail == "algorithm: lqr -> coast"
     status, thrust = recorded.arrays("/deputy1/status"), recorded.arrays("/deputy1/thrust")
     assert list(status["algorithm"]) == ["lqr"] * tick + ["coast"] * (600 - tick)
-    assert np.all(thrust["force"][tick:] == 0.0)
+    # no jump: a tenth of the 10 mN limit per tick, so that ten ticks after the swap nothing is left
+    steps = np.abs(np.diff(thrust["force"][tick - 1 : tick + 11], axis=0))
+    assert steps.max() <= 0.001 * (1.0 + 1e-12)
     assert np.any(thrust["force"][tick - 1] != 0.0)
+    assert np.all(thrust["force"][tick + 10 :] == 0.0)
     for topic in GNC_TOPICS:
         assert np.array_equal(recorded.arrays(topic)["stamp_ns"], np.arange(600) * 1_000_000_000)
 
@@ -124,7 +127,7 @@ def test_a_node_killed_and_started_again_rejoins_and_the_log_shows_the_gap(desk:
 
     misses = events(bag, "miss")
     assert misses
-    assert "/deputy1/navigation not there" in misses[0][1]
+    assert misses[0][1].startswith("deputy1 did not answer within 0.5 s")
     recorded = Bag(bag)
     answered = set(recorded.arrays("/deputy1/thrust")["stamp_ns"] // 1_000_000_000)
     assert answered == set(range(900)) - {tick for tick, _ in misses}
