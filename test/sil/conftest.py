@@ -110,7 +110,7 @@ class Sil:
     def children(self) -> dict[str, int]:
         """Process numbers of the nodes by executable name."""
         listed = subprocess.run(
-            ["ps", "--ppid", str(self.process.pid), "-o", "pid=,args="], capture_output=True, text=True, check=False
+            ["ps", "-ww", "--ppid", str(self.process.pid), "-o", "pid=,args="], capture_output=True, text=True, check=False
         ).stdout
         found = {}
         for line in listed.splitlines():

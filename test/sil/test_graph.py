@@ -73,7 +73,7 @@ def test_nodes_started_by_hand_in_any_order_fly_and_swap_the_law_in_flight(desk:
     kinds = ["plant", "recorder", *PARTS]
     random.shuffle(kinds)
     terminals = {kind: desk.start(kind, **options.get(kind, {})) for kind in kinds}
-    wait_until(lambda: "flying" in terminals["plant"].text, f"the start of {kinds}")
+    wait_until(lambda: "acquired" in terminals["navigation"].text, f"the first estimate of {kinds}")
     time.sleep(1.0)
     accepted, reason = set_parameter(desk, "/deputy1/controller", "algorithm", "coast")
     assert accepted, reason
@@ -114,7 +114,7 @@ def test_a_node_killed_and_started_again_rejoins_and_the_log_shows_the_gap(desk:
     desk.start("recorder", bag=bag)
     plant = desk.start("plant", duration=900.0, real_time_factor=100.0, deadline=0.5, wait_for_recorder=True)
     terminals = {kind: desk.start(kind) for kind in PARTS}
-    wait_until(lambda: "flying" in plant.text, "the start")
+    wait_until(lambda: "acquired" in terminals["navigation"].text, "the first estimate")
     time.sleep(2.0)
     terminals["navigation"].signal(signal.SIGKILL)
     wait_until(lambda: "miss" in plant.text, "the plant to miss the navigation")
