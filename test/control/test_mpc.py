@@ -2,7 +2,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis.extra import numpy as hnp
 from scipy.optimize import lsq_linear
 
@@ -94,6 +94,7 @@ def test_an_eccentric_chief_is_followed_on_its_own_model(vehicle, estimate, targ
     assert not any(command.fallback for command in commands)
 
 
+@settings(deadline=None)
 @given(hnp.arrays(float, 3, elements={"min_value": -2.0, "max_value": 2.0}))
 def test_the_total_thrust_polyhedron_lies_inside_the_sphere(point):
     if (np.abs(facet_normals() @ point) <= 1.0 / facet_reach()).all():
@@ -255,6 +256,7 @@ def test_what_cannot_be_solved_flies_the_last_plan_and_then_lqr(mission, vehicle
     assert not again.fallback
 
 
+@settings(deadline=None)
 @given(states=hnp.arrays(float, (4, 6), elements={"min_value": -1e12, "max_value": 1e12}))
 def test_any_sequence_of_estimates_gets_bounded_commands(states, estimate, target):
     values = {"chief.semi_major_axis": 6978100.0, "tick": 10.0, "algorithm": "mpc", "mpc.horizon": 6}

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import solve_discrete_are
 
@@ -33,6 +33,7 @@ def test_neokleous_printed_eigenvalues():
     np.testing.assert_allclose(cut, [[0.9156, 0.0462], [0.9159, 0.0458], [0.9161, 0.0454]], rtol=1e-12)
 
 
+@settings(deadline=None)
 @given(
     position=st.floats(-3.0, 3.0),
     velocity=st.floats(-5.0, 0.0),
