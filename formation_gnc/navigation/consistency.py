@@ -38,7 +38,8 @@ class Consistency:
 
     def __init__(self) -> None:
         """Without a history."""
-        self._window: deque[tuple[float, int]] = deque(maxlen=WINDOW)
+        self._nis: deque[float] = deque(maxlen=WINDOW)
+        self._freedom: deque[int] = deque(maxlen=WINDOW)
         self._refused = 0
 
     def judge(self, nis: float, taken: int, refused: int) -> tuple[Verdict, float]:
@@ -59,11 +60,13 @@ class Consistency:
                 return Verdict.FINE, 1.0
             return (Verdict.GIVE_UP if inflations >= INFLATIONS else Verdict.INFLATE), INFLATION
         self._refused = 0
-        self._window.append((nis, taken))
-        total, freedom = sum(each for each, _ in self._window), sum(count for _, count in self._window)
-        if len(self._window) < WINDOW or total <= _bound(freedom):
+        self._nis.append(nis)
+        self._freedom.append(taken)
+        total, freedom = sum(self._nis), sum(self._freedom)
+        if len(self._nis) < WINDOW or total <= _bound(freedom):
             return Verdict.FINE, 1.0
-        self._window.clear()
+        self._nis.clear()
+        self._freedom.clear()
         return Verdict.INFLATE, total / freedom
 
 

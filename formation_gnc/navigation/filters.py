@@ -29,8 +29,8 @@ class RelativeFilter(Protocol):
     def fly(self, process: ProcessModel, leg: Leg, noise: Matrix) -> Matrix:
         """Predict to the end of the leg; returns the transition matrix (6, 6)."""
 
-    def weigh(self, readings: Readings) -> tuple[Vector, Vector]:
-        """Innovations (k,) of readings and their predicted variances (k,), each for itself."""
+    def weigh(self, readings: Readings) -> tuple[Vector, Vector, Matrix]:
+        """Innovations (k,) of readings, the predicted variance of each (k,), and the Jacobian (k, 6)."""
 
     def correct(self, chosen: np.ndarray, pseudo: bool) -> float:
         """Take those of the weighed readings for which the mask (k,) holds, and return their NIS.
@@ -52,17 +52,19 @@ class ExtendedFilter(ExtendedKalmanFilter):  # type: ignore[misc]
         self.x, self.P, self.F = process.predict(leg, self.x, self.P, noise)
         return self.F
 
-    def weigh(self, readings: Readings) -> tuple[Vector, Vector]:
+    def weigh(self, readings: Readings) -> tuple[Vector, Vector, Matrix]:
         """Linearise at the predicted state."""
         expected, jacobian = readings.expected(self.x)
-        self._weighed = readings, readings.innovation(expected), expected, jacobian
-        return self._weighed[1], np.einsum("ij,jk,ik->i", jacobian, self.P, jacobian) + readings.variance
+        innovation = readings.innovation(expected)
+        self._weighed = readings, innovation, expected, jacobian
+        return innovation, kernels.variances(jacobian, self.P, readings.variance), jacobian
 
     def correct(self, chosen: np.ndarray, pseudo: bool) -> float:
         """FilterPy's update with what was linearised."""
         readings, innovation, expected, jacobian = self._weighed
-        noise = np.diag(readings.variance[chosen])
-        innovation, jacobian = innovation[chosen], jacobian[chosen]
+        variance = readings.variance
+        if not chosen.all():
+            innovation, jacobian, variance = innovation[chosen], jacobian[chosen], variance[chosen]
         if pseudo:
             sensor, expected = readings.sensor[chosen], expected[chosen]
             radius = sqrt(readings.chief[:3] @ readings.chief[:3])
@@ -70,11 +72,15 @@ class ExtendedFilter(ExtendedKalmanFilter):  # type: ignore[misc]
             innovation = pseudo_measurements(sensor, expected + innovation, radius) - pseudo_measurements(
                 sensor, expected, radius
             )
-            jacobian, noise = slope @ jacobian, slope @ noise @ slope.T
-            scale = np.sqrt(np.diag(noise))  # their units differ by fourteen orders of magnitude in variance
-            innovation, jacobian = innovation / scale, jacobian / scale[:, None]
-            noise = noise / np.outer(scale, scale)
-        self.update(innovation, lambda _: jacobian, lambda _: 0.0, R=noise)
+            jacobian, noise = slope @ jacobian, slope * variance @ slope.T
+            variance = np.diag(noise)
+            noise = noise / np.sqrt(np.outer(variance, variance))
+        else:
+            noise = np.eye(len(variance))
+        # In standard deviations: variances in m^2 and rad^2 are too far apart to invert together.
+        scale = np.sqrt(variance)
+        jacobian = jacobian / scale[:, None]
+        self.update(innovation / scale, lambda _: jacobian, lambda _: 0.0, R=noise)
         self.P, _ = kernels.settle(self.P)
         return float(self.y @ self.SI @ self.y)
 
@@ -99,14 +105,15 @@ class UnscentedFilter(UnscentedKalmanFilter):  # type: ignore[misc]
         self.P, _ = kernels.settle(covariance)
         return transition
 
-    def weigh(self, readings: Readings) -> tuple[Vector, Vector]:
+    def weigh(self, readings: Readings) -> tuple[Vector, Vector, Matrix]:
         """Read at the points of the prediction."""
         self.sigmas_f = self.points_fn.sigma_points(self.x, self.P)
         expected = np.array([readings.expected(point)[0] for point in self.sigmas_f])
         innovation = readings.innovation(expected)  # by point: small numbers, and angles without a seam
         mean = self.Wm @ innovation
         self._weighed = readings, innovation
-        return mean, self.Wc @ (innovation - mean) ** 2 + readings.variance
+        variance = self.Wc @ (innovation - mean) ** 2 + readings.variance
+        return mean, variance, readings.expected(self.x)[1]
 
     def correct(self, chosen: np.ndarray, pseudo: bool) -> float:
         """FilterPy's update with what the points read."""
@@ -121,8 +128,8 @@ class UnscentedFilter(UnscentedKalmanFilter):  # type: ignore[misc]
                 sensor, reading, radius
             )
             noise = slope @ noise @ slope.T
-            scale = np.sqrt(np.diag(noise))
-            read, noise = read / scale, noise / np.outer(scale, scale)
+        scale = np.sqrt(np.diag(noise))
+        read, noise = read / scale, noise / (scale[:, None] * scale)
         points = iter(read)
         self.update(np.zeros(read.shape[1]), R=noise, hx=lambda _: next(points))
         self.P, _ = kernels.settle(self.P)

@@ -360,6 +360,28 @@ def inform(total: Array, jacobian: Array, since: Array, variance: Array) -> Arra
     return out
 
 
+@kernel((_ANY_MATRIX, _ANY_MATRIX, ANY_VECTOR))
+def variances(jacobian: Array, covariance: Array, noise: Array) -> Array:
+    """Variance (k,) of each of k readings: diagonal of H P H' with H (k, 6), plus their noise (k,)."""
+    half = _product(jacobian, covariance)
+    out = noise.copy()
+    for row in range(jacobian.shape[0]):
+        for k in range(jacobian.shape[1]):
+            out[row] += half[row, k] * jacobian[row, k]
+    return out
+
+
+@kernel((ANY_VECTOR, _ANY_MATRIX))
+def sound(state: Array, covariance: Array) -> bool:
+    """Whether a state (6,) and its covariance (6, 6) are finite."""
+    total = 0.0
+    for i in range(6):
+        total += 0.0 * state[i]
+        for j in range(6):
+            total += 0.0 * covariance[i, j]
+    return total == 0.0
+
+
 @kernel((_ANY_MATRIX,))
 def settle(covariance: Array) -> tuple[Array, bool]:
     """A covariance made symmetric, and positive definite if rounding has taken that from it.

@@ -1,7 +1,7 @@
 """Relative navigation of one deputy, from measurement to estimate."""
 
 from dataclasses import dataclass, field
-from math import isfinite, sqrt
+from math import isfinite
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from formation_gnc.navigation.filters import FILTERS, RelativeFilter
 from formation_gnc.navigation.measurement import NAMES, Readings, Track
 from formation_gnc.navigation.observability import Observability, orbit_period
 from formation_gnc.navigation.process import PROCESS_MODELS, Leg, ProcessModel, process_noise, substeps
-from formation_gnc.navigation.screening import Refusals, Screen, credible_chief, credible_fix, sound
+from formation_gnc.navigation.screening import Refusals, Screen, credible_chief, credible_fix
 from formation_gnc.parameters import parameter
 from formation_gnc.part import Configuration, Part, Schedulable
 
@@ -30,6 +30,9 @@ CHIEF_DISTANCE, CHIEF_SPEED = 100.0, 1.0
 """How far (m, m/s) the chief's ephemeris may jump in a tick of a second or more from where gravity with J2
 takes it, and in proportion in a shorter one: much more than the model leaves out, much less than a frozen
 ephemeris is off."""
+
+GREATEST_ACCELERATION = 100.0
+"""What no thruster gives a satellite, m/s^2: an applied force above it is a mistake."""
 
 _NO_ACCELERATION = np.zeros(3)
 _UNKNOWN = np.full(6, np.nan)
@@ -177,13 +180,41 @@ class NavigationParameters(Schedulable):
             )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
+class Stride:
+    """A time to predict over, and what depends on its length alone."""
+
+    nanoseconds: int
+    seconds: float
+    substeps: int
+    distance: float
+    """How far the chief's ephemeris may jump, m."""
+    speed: float
+    """The same, m/s."""
+    noise: Matrix
+    """(6, 6) covariance that the process adds."""
+
+
+def stride(nanoseconds: int, density: float) -> Stride:
+    """A stride of a length, with process noise of a density (m^2/s^3)."""
+    seconds = nanoseconds / NANOSECONDS
+    share = min(1.0, seconds)
+    return Stride(
+        nanoseconds,
+        seconds,
+        substeps(seconds),
+        CHIEF_DISTANCE * share,
+        CHIEF_SPEED * share,
+        process_noise(density, seconds),
+    )
+
+
+@dataclass(frozen=True, slots=True)
 class Design:
     """What follows from the parameters."""
 
     process: ProcessModel
-    noise: Matrix
-    """(6, 6) covariance that the process adds over a tick."""
+    tick: Stride
     variance: dict[int, float]
     """Of the noise of every sensor in use."""
     gate: float
@@ -233,7 +264,7 @@ class Navigator(Part[NavigationParameters, Design]):
         used = [sensor for sensor in Sensor if NAMES[sensor] in parameters.sensors]
         return Design(
             PROCESS_MODELS[parameters.process_model](parameters),
-            process_noise(parameters.acceleration_density, parameters.tick),
+            stride(parameters.tick_ns, parameters.acceleration_density),
             {int(sensor): getattr(parameters, f"{NAMES[sensor]}_sigma") ** 2 for sensor in used},
             parameters.gate**2,
         )
@@ -274,7 +305,7 @@ class Navigator(Part[NavigationParameters, Design]):
             assert self._flight is not None
             flight = self._flight
             self._predict(flight, measurement)
-            if not sound(flight.filter.x, flight.filter.P):
+            if not kernels.sound(flight.filter.x, flight.filter.P):
                 self._give_up(measurement.time, "prediction not finite")
                 return None
         estimate = self._update(flight, measurement, status)
@@ -288,17 +319,15 @@ class Navigator(Part[NavigationParameters, Design]):
         if measurement.deputy not in ("", self._deputy):
             refuse(Refusal.WRONG_DEPUTY, "measurement", f"of {measurement.deputy}")
             return None
-        fix = False
-        if measurement.fix_available:
-            fix = credible_chief(measurement.chief_state) and credible_fix(
-                measurement.fix, measurement.chief_state
-            )
-            if not fix:
-                refuse(Refusal.FIX, "acquisition fix")
+        fix = self._can_acquire(measurement)
+        if measurement.fix_available and not fix:
+            refuse(Refusal.FIX, "acquisition fix")
         flight = self._flight
         if flight is None:
             return True if fix else None
         gap = measurement.time - flight.time
+        if gap == self.configuration.design.tick.nanoseconds:
+            return False
         if gap == 0:
             refuse(Refusal.DUPLICATE, "measurement")
             return None
@@ -308,6 +337,13 @@ class Navigator(Part[NavigationParameters, Design]):
             refuse(Refusal.OUT_OF_ORDER if gap < 0 else Refusal.FUTURE, "measurement")
             return None
         return False
+
+    def _can_acquire(self, measurement: Measurement) -> bool:
+        return (
+            measurement.fix_available
+            and credible_chief(measurement.chief_state)
+            and credible_fix(measurement.fix, measurement.chief_state)
+        )
 
     def _acquire(self, measurement: Measurement) -> Flight:
         parameters = self.parameters
@@ -344,27 +380,26 @@ class Navigator(Part[NavigationParameters, Design]):
 
     def _predict(self, flight: Flight, measurement: Measurement) -> None:
         """Fly to the measurement's stamp, through ticks that never arrived on the way."""
-        tick = self.parameters.tick_ns
+        tick = self.configuration.design.tick
         gap = measurement.time - flight.time
         # Ticks that never arrived were missed ones: no thrust, and the chief flew on as the model says.
-        while gap > tick:
+        while gap > tick.nanoseconds:
             self._fly(flight, _UNKNOWN, _NO_ACCELERATION, tick)
-            gap -= tick
-        self._fly(flight, measurement.chief_state, self._acceleration(flight, measurement), gap)
+            gap -= tick.nanoseconds
+        if gap < tick.nanoseconds:
+            tick = stride(gap, self.parameters.acceleration_density)
+        self._fly(flight, measurement.chief_state, self._acceleration(flight, measurement), tick)
         self._watch_chief(flight, measurement)
 
-    def _fly(self, flight: Flight, told: Vector, acceleration: Vector, duration_ns: int) -> None:
-        design, duration = self.configuration.design, duration_ns / NANOSECONDS
-        chief, flight.chief_known = _follow(flight.chief, told, duration)
-        leg = Leg(flight.chief, chief, acceleration, duration)
-        whole = duration_ns == self.parameters.tick_ns
-        noise = design.noise if whole else process_noise(self.parameters.acceleration_density, duration)
-        transition = flight.filter.fly(design.process, leg, noise)
+    def _fly(self, flight: Flight, told: Vector, acceleration: Vector, over: Stride) -> None:
+        chief, flight.chief_known = _follow(flight.chief, told, over)
+        leg = Leg(flight.chief, chief, acceleration, over.seconds, over.substeps)
+        transition = flight.filter.fly(self.configuration.design.process, leg, over.noise)
         flight.track.add(leg)
         flight.chief = chief
-        flight.time += duration_ns
+        flight.time += over.nanoseconds
         words = flight.observability.words
-        if flight.observability.fly(transition, duration) and flight.observability.words != words:
+        if flight.observability.fly(transition, over.seconds) and flight.observability.words != words:
             self._tell_blind(flight)
 
     def _acceleration(self, flight: Flight, measurement: Measurement) -> Vector:
@@ -373,12 +408,12 @@ class Navigator(Part[NavigationParameters, Design]):
             self._refusals.add(Refusal.AVIONICS, "mass")
         else:
             flight.mass = measurement.mass
-        force = measurement.applied_force
-        x, y, z = force.tolist()
-        if not isfinite(x + y + z):
+        acceleration: Vector = measurement.applied_force / flight.mass
+        x, y, z = acceleration.tolist()
+        within = x * x + y * y + z * z <= GREATEST_ACCELERATION**2  # false for what is not a number
+        if not within:
             self._refusals.add(Refusal.AVIONICS, "applied force")
             return _NO_ACCELERATION
-        acceleration: Vector = force / flight.mass
         return acceleration
 
     def _watch_chief(self, flight: Flight, measurement: Measurement) -> None:
@@ -389,7 +424,7 @@ class Navigator(Part[NavigationParameters, Design]):
         if (
             credible_chief(told)
             and credible_chief(flight.told)
-            and _follow(told, flight.told, self.parameters.tick)[1]
+            and _follow(told, flight.told, self.configuration.design.tick)[1]
         ):
             state = kernels.relative_to(flight.chief, flight.filter.x, flight.told)
             flight.filter = FILTERS[self.parameters.filter](state, flight.filter.P)
@@ -413,15 +448,18 @@ class Navigator(Part[NavigationParameters, Design]):
             )
             if readings is not None:
                 before = flight.filter.x, flight.filter.P
-                passed, offset, variance = self._weigh(flight, readings)
+                passed, offset, variance, jacobian = self._weigh(flight, readings)
                 if passed.any():
-                    chosen = readings.select(passed)
-                    flight.observability.take(chosen.expected(flight.filter.x)[1], chosen.variance)
+                    chosen = readings
+                    if not passed.all():
+                        chosen = readings.select(passed)
+                        offset, variance, jacobian = offset[passed], variance[passed], jacobian[passed]
+                    flight.observability.take(jacobian, chosen.variance)
                     used = chosen.sensor.tolist()
-                    innovation, sigma = offset[passed].tolist(), np.sqrt(variance[passed]).tolist()
+                    innovation, sigma = offset.tolist(), np.sqrt(variance).tolist()
                     nis = flight.filter.correct(passed, self._pseudo(chosen))
                     flight.last_reading = flight.time
-                if not (sound(flight.filter.x, flight.filter.P) and isfinite(nis)):
+                if not (kernels.sound(flight.filter.x, flight.filter.P) and isfinite(nis)):
                     flight.filter = FILTERS[self.parameters.filter](*before)
                     self._give_up(measurement.time, "update not finite")
                     return None
@@ -430,7 +468,7 @@ class Navigator(Part[NavigationParameters, Design]):
                     self._give_up(measurement.time, "readings contradict the state, however uncertain")
                     return None
                 if verdict is Verdict.INFLATE:
-                    if measurement.fix_available and credible_fix(measurement.fix, flight.chief):
+                    if self._can_acquire(measurement):
                         return self._update(self._acquire(measurement), measurement, EstimateStatus.ACQUIRED)
                     flight.filter.P = flight.filter.P * factor
                     self.record(measurement.time, "diverged", f"covariance inflated by {factor:.3g}")
@@ -457,20 +495,22 @@ class Navigator(Part[NavigationParameters, Design]):
             blind=flight.observability.words,
         )
 
-    def _weigh(self, flight: Flight, readings: Readings) -> tuple[np.ndarray, Vector, Vector]:
-        """Which readings pass the gate, their innovations and the variances of these."""
-        offset, variance = flight.filter.weigh(readings)
-        with np.errstate(over="ignore", invalid="ignore"):
+    def _weigh(self, flight: Flight, readings: Readings) -> tuple[np.ndarray, Vector, Vector, Matrix]:
+        """Which readings pass the gate; all their innovations, the variances of these and the Jacobian."""
+        with np.errstate(all="ignore"):  # whatever a reading says; what comes of it is compared below
+            offset, variance, jacobian = flight.filter.weigh(readings)
             passed = offset * offset <= self.configuration.design.gate * variance
-        if not passed.all():
-            for index in np.flatnonzero(~passed):
-                name = NAMES[Sensor(int(readings.sensor[index]))]
-                if isfinite(offset[index] + variance[index]):
-                    off = abs(offset[index]) / sqrt(variance[index])
-                    self._refusals.add(Refusal.GATE, name, f"{off:.1f} standard deviations off")
-                else:
-                    self._refusals.add(Refusal.NO_DIRECTION, name)
-        return passed, offset, variance
+        if passed.all():
+            return passed, offset, variance, jacobian
+        with np.errstate(all="ignore"):
+            distance = np.abs(offset) / np.sqrt(variance)
+        for index in np.flatnonzero(~passed).tolist():
+            name = NAMES[Sensor(int(readings.sensor[index]))]
+            if isfinite(distance[index]):
+                self._refusals.add(Refusal.GATE, name, f"{distance[index]:.1f} standard deviations off")
+            else:
+                self._refusals.add(Refusal.NO_DIRECTION, name)
+        return passed, offset, variance, jacobian
 
     def _pseudo(self, readings: Readings) -> bool:
         three = {int(Sensor.RADIUS), int(Sensor.RANGE_RATE), int(Sensor.LATITUDE)}
@@ -486,14 +526,13 @@ class Navigator(Part[NavigationParameters, Design]):
         self.record(time, "lost", f"{why}: waiting for an acquisition fix")
 
 
-def _follow(chief: Vector, told: Vector, duration: float) -> tuple[Vector, bool]:
-    """The chief after a duration, s: as told if that is credible, and whether it is."""
-    share = min(1.0, duration)
+def _follow(chief: Vector, told: Vector, over: Stride) -> tuple[Vector, bool]:
+    """The chief after a stride: as told if that is credible, and whether it is."""
     followed: tuple[Vector, bool] = kernels.follow(
-        chief, told, duration, substeps(duration), CHIEF_DISTANCE * share, CHIEF_SPEED * share
+        chief, told, over.seconds, over.substeps, over.distance, over.speed
     )
     return followed
 
 
 def _can_weigh(mass: float) -> bool:
-    return isfinite(mass) and mass > 0.0
+    return isfinite(mass) and mass > 1e-6

@@ -31,6 +31,8 @@ class Leg:
     """(3,) by thrust, along the Hill axes at the start, m/s^2."""
     duration: float
     """s."""
+    substeps: int
+    """Integration steps to take."""
 
 
 class ProcessModel(ABC):
@@ -63,14 +65,14 @@ class NonlinearProcess(ProcessModel):
             noise,
             leg.acceleration,
             leg.duration,
-            substeps(leg.duration),
+            leg.substeps,
         )
         return moved
 
     def move(self, leg: Leg, points: Matrix) -> Matrix:
         """Each in the inertial frame."""
         moved: Matrix = kernels.fly_points(
-            leg.chief, leg.next_chief, points, leg.acceleration, leg.duration, substeps(leg.duration)
+            leg.chief, leg.next_chief, points, leg.acceleration, leg.duration, leg.substeps
         )
         return moved
 

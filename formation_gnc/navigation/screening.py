@@ -4,11 +4,14 @@ from math import isfinite
 
 import numpy as np
 
-from formation_gnc.interface import NANOSECONDS, Counts, Matrix, Measurement, Refusal, Sensor, Vector
+from formation_gnc.interface import NANOSECONDS, Counts, Measurement, Refusal, Sensor, Vector
 from formation_gnc.navigation.measurement import NAMES, Readings, Track
 from formation_gnc.orbit.constants import EARTH_RADIUS
 
 WORDS = {reason: reason.name.lower().replace("_", " ") for reason in Refusal}
+
+MEMORY = 20
+"""Times of readings of a sensor above which those are forgotten that are too old to come again."""
 
 _KNOWN = frozenset(int(sensor) for sensor in Sensor)
 
@@ -95,13 +98,14 @@ class Screen:
             return Refusal.FUTURE
         if age > latest:
             return Refusal.LATE
-        taken = time - round(age * NANOSECONDS)
+        taken = time - round(age * NANOSECONDS) if age else time
         known = self._taken.setdefault(sensor, [])
         if taken in known:
             return Refusal.DUPLICATE
-        oldest = time - round(latest * NANOSECONDS)
-        self._taken[sensor] = [each for each in known if each >= oldest]
-        self._taken[sensor].append(taken)
+        if len(known) > MEMORY:
+            oldest = time - round(latest * NANOSECONDS)
+            known[:] = [each for each in known if each >= oldest]
+        known.append(taken)
         return None
 
 
@@ -122,8 +126,3 @@ def credible_chief(chief: Vector) -> bool:
     radial = x * vx + y * vy + z * vz
     across = square * speed - radial * radial
     return square > EARTH_RADIUS**2 and 1.0 < across < 1e26 and speed < 1.2e4**2
-
-
-def sound(state: Vector, covariance: Matrix) -> bool:
-    """Whether a state and its covariance are finite."""
-    return isfinite(float(state.sum()) + float(covariance.sum()))
