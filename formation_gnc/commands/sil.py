@@ -20,6 +20,7 @@ from rich.table import Table
 
 from formation_gnc.control.registry import ALGORITHMS
 from formation_gnc.errors import ConfigurationError
+from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import Scenario, duration_of, load_scenario
 
 
@@ -131,6 +132,8 @@ class _Display:
 def _fly_on_graph(scenario: Scenario, bag: Path, console: Console) -> float:
     from formation_gnc.nodes.launcher import Report, fly_graph
 
+    Run(scenario)  # what cannot be flown is refused before anything starts
+
     def show(report: Report) -> None:
         display.show(report.message, report.figures.get("tick", 0.0), report.figures.get("speedup", 0.0))
 
@@ -142,7 +145,6 @@ def _fly_in_process(scenario: Scenario, bag: Path, console: Console) -> float:
     from formation_gnc.nodes.record_in_process import InProcessRecorder
     from formation_gnc.recording.provenance import provenance
     from formation_gnc.recording.writer import BagWriter
-    from formation_gnc.sil.runner import Run
 
     run = Run(scenario)
     tick, pace = scenario.plant.tick, scenario.plant.real_time_factor
