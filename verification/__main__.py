@@ -11,7 +11,7 @@ OUTPUT = Path("docs/verification")
 
 
 def main(names: list[str]) -> int:
-    """Write the pages of the modules here that have a `main`; return 1 when a figure is outside its tolerance."""
+    """Write the pages of the modules here that have a `main`; 1 when a figure is outside its tolerance."""
     failures = 0
     for name in names or sorted(module.name for module in pkgutil.iter_modules(verification.__path__)):
         if name == "__main__":

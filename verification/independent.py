@@ -113,6 +113,14 @@ class Heyoka:
         self._integrator.propagate_until(self._precision(duration))
         return np.array(self._integrator.state, dtype=np.float64)
 
+    def fly_in_ticks(self, state: Array, duration: float, tick: float) -> Array:
+        """The same, stopped at every tick, s, as a thrust that changes there would need."""
+        self._integrator.time = self._precision(0.0)
+        self._integrator.state[:] = state
+        for k in range(1, round(duration / tick) + 1):
+            self._integrator.propagate_until(self._precision(k * tick))
+        return np.array(self._integrator.state, dtype=np.float64)
+
 
 class _Sky(sysModel.SysModel):
     """Basilisk module that says where Sun and Moon are and how the Earth is turned."""
@@ -153,7 +161,8 @@ class _Sky(sysModel.SysModel):
 class Basilisk:
     """A Basilisk simulation of spacecraft under the given forces.
 
-    `band` is base density (kg/m^3), scale height (m) and base altitude (m) of its one-band atmosphere.
+    `band` is base density (kg/m^3), scale height (m) and base altitude (m) of its one-band atmosphere;
+    `still_sky` sends the places of Sun, Moon and Earth once, so that no Python runs in the loop.
     """
 
     forces: Forces
@@ -164,6 +173,7 @@ class Basilisk:
     places: Places = series
     band: tuple[float, float, float] = (3.725e-12, 58.515e3, 400e3)
     precise: bool = True
+    still_sky: bool = False
 
     def __post_init__(self) -> None:
         """Build and initialise the simulation."""
@@ -176,7 +186,10 @@ class Basilisk:
         self._sky = None
         if forces.sun or forces.moon or forces.radiation_pressure or forces.drag or forces.harmonics_degree:
             self._sky = _Sky(self.epoch, self.places, self.step)
-            self._simulation.AddModelToTask("task", self._sky, 1000)
+            if self.still_sky:
+                self._sky.UpdateState(0)
+            else:
+                self._simulation.AddModelToTask("task", self._sky, 1000)
         self._craft = [self._spacecraft(index, state) for index, state in enumerate(self.states)]
         self._simulation.InitializeSimulation()
 

@@ -1,4 +1,9 @@
-"""The Earth's gravity field in spherical harmonics, after Cunningham (Montenbruck and Gill, section 3.2)."""
+"""The Earth's gravity field in spherical harmonics, after Cunningham (Montenbruck and Gill, section 3.2).
+
+With V_nm and W_nm the solid harmonics of a point, the potential is ``mu / R sum (C_nm V_nm + S_nm W_nm)``.
+Derivatives of solid harmonics are solid harmonics one degree up, so every component of the acceleration is
+such a sum as well, and its coefficients are worked out here, once. No place is singular, the poles included.
+"""
 
 from math import factorial, sqrt
 
@@ -10,18 +15,32 @@ from formation_gnc.orbit.jit import inline
 
 _SIZE = MAXIMUM_DEGREE + 2
 
-# Factors of the recursion over the degree, and coefficients without normalisation.
+# Factors of the recursion over the degree.
 _AHEAD, _BEHIND = np.zeros((_SIZE, _SIZE)), np.zeros((_SIZE, _SIZE))
 for _n in range(_SIZE):
     for _m in range(_n):
         _AHEAD[_n, _m] = (2 * _n - 1) / (_n - _m)
         _BEHIND[_n, _m] = (_n + _m - 1) / (_n - _m)
-_C, _S = NORMALISED_C.copy(), NORMALISED_S.copy()
+
+# Coefficients of V and W of degree n + 1 in the acceleration that degree n makes (Montenbruck and Gill 3.33).
+_XV, _XW, _YV, _YW, _ZV, _ZW = np.zeros((6, _SIZE, _SIZE))
 for _n in range(MAXIMUM_DEGREE + 1):
     for _m in range(_n + 1):
         _scale = sqrt((2 - (_m == 0)) * (2 * _n + 1) * factorial(_n - _m) / factorial(_n + _m))
-        _C[_n, _m] *= _scale
-        _S[_n, _m] *= _scale
+        _c, _s = _scale * NORMALISED_C[_n, _m], _scale * NORMALISED_S[_n, _m]
+        _half = 1.0 if _m == 0 else 0.5
+        _XV[_n, _m + 1] -= _half * _c
+        _XW[_n, _m + 1] -= _half * _s
+        _YV[_n, _m + 1] += _half * _s
+        _YW[_n, _m + 1] -= _half * _c
+        if _m > 0:
+            _rise = 0.5 * (_n - _m + 2) * (_n - _m + 1)
+            _XV[_n, _m - 1] += _rise * _c
+            _XW[_n, _m - 1] += _rise * _s
+            _YV[_n, _m - 1] += _rise * _s
+            _YW[_n, _m - 1] -= _rise * _c
+        _ZV[_n, _m] -= (_n - _m + 1) * _c
+        _ZW[_n, _m] -= (_n - _m + 1) * _s
 
 
 @inline
@@ -36,32 +55,22 @@ def acceleration(
     r2 = x * x + y * y + z * z
     px, py, pz = x * EARTH_RADIUS / r2, y * EARTH_RADIUS / r2, z * EARTH_RADIUS / r2
     square = EARTH_RADIUS * EARTH_RADIUS / r2
-    v, w = np.zeros((_SIZE, _SIZE)), np.zeros((_SIZE, _SIZE))
-    v[0, 0] = EARTH_RADIUS / sqrt(r2)
-    for m in range(degree + 2):
-        if m > 0:
-            v[m, m] = (2 * m - 1) * (px * v[m - 1, m - 1] - py * w[m - 1, m - 1])
-            w[m, m] = (2 * m - 1) * (px * w[m - 1, m - 1] + py * v[m - 1, m - 1])
-        if m <= degree:
-            v[m + 1, m] = _AHEAD[m + 1, m] * pz * v[m, m]
-            w[m + 1, m] = _AHEAD[m + 1, m] * pz * w[m, m]
-        for n in range(m + 2, degree + 2):
-            v[n, m] = _AHEAD[n, m] * pz * v[n - 1, m] - _BEHIND[n, m] * square * v[n - 2, m]
-            w[n, m] = _AHEAD[n, m] * pz * w[n - 1, m] - _BEHIND[n, m] * square * w[n - 2, m]
+    v, w = np.empty((_SIZE, _SIZE)), np.empty((_SIZE, _SIZE))  # filled up to degree + 1, m <= n
+    v[0, 0], w[0, 0] = EARTH_RADIUS / sqrt(r2), 0.0
+    for n in range(1, degree + 2):
+        before = n - 1
+        for m in range(n - 1):  # orders do not depend on one another: this loop runs in vector registers
+            v[n, m] = _AHEAD[n, m] * pz * v[before, m] - _BEHIND[n, m] * square * v[n - 2, m]
+            w[n, m] = _AHEAD[n, m] * pz * w[before, m] - _BEHIND[n, m] * square * w[n - 2, m]
+        v[n, before] = _AHEAD[n, before] * pz * v[before, before]
+        w[n, before] = _AHEAD[n, before] * pz * w[before, before]
+        v[n, n] = (2 * n - 1) * (px * v[before, before] - py * w[before, before])
+        w[n, n] = (2 * n - 1) * (px * w[before, before] + py * v[before, before])
     ax, ay, az = 0.0, 0.0, 0.0
     for n in range(degree, -1, -1):  # the small terms first
-        for m in range(n, 0, -1):
-            c, s = 0.5 * _C[n, m], 0.5 * _S[n, m]
-            rise = (n - m + 2) * (n - m + 1)
-            ax += (
-                rise * (c * v[n + 1, m - 1] + s * w[n + 1, m - 1]) - c * v[n + 1, m + 1] - s * w[n + 1, m + 1]
-            )
-            ay += (
-                rise * (s * v[n + 1, m - 1] - c * w[n + 1, m - 1]) - c * w[n + 1, m + 1] + s * v[n + 1, m + 1]
-            )
-            az -= 2.0 * (n - m + 1) * (c * v[n + 1, m] + s * w[n + 1, m])
-        ax -= _C[n, 0] * v[n + 1, 1]
-        ay -= _C[n, 0] * w[n + 1, 1]
-        az -= (n + 1) * _C[n, 0] * v[n + 1, 0]
+        for m in range(n + 2):
+            ax += _XV[n, m] * v[n + 1, m] + _XW[n, m] * w[n + 1, m]
+            ay += _YV[n, m] * v[n + 1, m] + _YW[n, m] * w[n + 1, m]
+            az += _ZV[n, m] * v[n + 1, m] + _ZW[n, m] * w[n + 1, m]
     scale = MU / (EARTH_RADIUS * EARTH_RADIUS)
     return scale * (cos_turn * ax - sin_turn * ay), scale * (sin_turn * ax + cos_turn * ay), scale * az
