@@ -32,8 +32,8 @@ class RelativeFilter(Protocol):
     def weigh(self, readings: Readings) -> tuple[Vector, Vector, Matrix]:
         """Innovations (k,) of readings, the predicted variance of each (k,), and the Jacobian (k, 6)."""
 
-    def correct(self, chosen: np.ndarray, pseudo: bool) -> float:
-        """Take those of the weighed readings for which the mask (k,) holds, and return their NIS.
+    def correct(self, pseudo: bool) -> float:
+        """Take the readings weighed last, and return their NIS.
 
         pseudo: as Neokleous' pseudo-measurements, with their noise to first order.
         """
@@ -59,14 +59,12 @@ class ExtendedFilter(ExtendedKalmanFilter):  # type: ignore[misc]
         self._weighed = readings, innovation, expected, jacobian
         return innovation, kernels.variances(jacobian, self.P, readings.variance), jacobian
 
-    def correct(self, chosen: np.ndarray, pseudo: bool) -> float:
+    def correct(self, pseudo: bool) -> float:
         """FilterPy's update with what was linearised."""
         readings, innovation, expected, jacobian = self._weighed
         variance = readings.variance
-        if not chosen.all():
-            innovation, jacobian, variance = innovation[chosen], jacobian[chosen], variance[chosen]
         if pseudo:
-            sensor, expected = readings.sensor[chosen], expected[chosen]
+            sensor = readings.sensor
             radius = sqrt(readings.chief[:3] @ readings.chief[:3])
             slope = pseudo_jacobian(sensor, expected)
             innovation = pseudo_measurements(sensor, expected + innovation, radius) - pseudo_measurements(
@@ -115,13 +113,13 @@ class UnscentedFilter(UnscentedKalmanFilter):  # type: ignore[misc]
         variance = self.Wc @ (innovation - mean) ** 2 + readings.variance
         return mean, variance, readings.expected(self.x)[1]
 
-    def correct(self, chosen: np.ndarray, pseudo: bool) -> float:
+    def correct(self, pseudo: bool) -> float:
         """FilterPy's update with what the points read."""
         readings, innovation = self._weighed
-        noise = np.diag(readings.variance[chosen])
-        read = -innovation[:, chosen]
+        noise = np.diag(readings.variance)
+        read = -innovation
         if pseudo:
-            sensor, reading = readings.sensor[chosen], readings.value[chosen]
+            sensor, reading = readings.sensor, readings.value
             radius = sqrt(readings.chief[:3] @ readings.chief[:3])
             slope = pseudo_jacobian(sensor, reading)
             read = pseudo_measurements(sensor, reading + read, radius) - pseudo_measurements(

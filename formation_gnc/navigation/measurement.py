@@ -15,6 +15,8 @@ from formation_gnc.orbit.propagation import advance_with_transition
 NAMES = {sensor: sensor.name.lower() for sensor in Sensor}
 """Sensors as parameters and events call them."""
 
+_RIGHT_ASCENSION = int(Sensor.RIGHT_ASCENSION)
+
 _AT_REST = np.zeros(3)
 
 
@@ -70,11 +72,13 @@ class Readings:
     chief: Vector
     """(6,) the chief's inertial state now."""
     track: Track
+    late: bool
+    """Whether any of them is older than now."""
 
     def expected(self, state: Vector) -> tuple[Vector, Matrix]:
         """(k,) readings without noise at a relative state now (6,), and their Jacobian (k, 6) with respect
         to it."""
-        if not self.age.any():
+        if not self.late:
             now: tuple[Vector, Matrix] = kernels.read_relative(self.sensor, self.chief, state)
             return now
         deputy = inertial_from_relative(self.chief, state)
@@ -90,15 +94,13 @@ class Readings:
     def innovation(self, expected: Vector) -> Vector:
         """(..., k) reading minus expectation (..., k), angles the short way round."""
         difference: Vector = self.value - expected
-        turning = self.sensor == Sensor.RIGHT_ASCENSION
+        turning = self.sensor == _RIGHT_ASCENSION
         if turning.any():
             difference[..., turning] = (difference[..., turning] + pi) % (2.0 * pi) - pi
         return difference
 
     def select(self, chosen: np.ndarray) -> "Readings":
         """Those for which the mask (k,) holds."""
-        if chosen.all():
-            return self
         return Readings(
             self.sensor[chosen],
             self.value[chosen],
@@ -106,6 +108,7 @@ class Readings:
             self.variance[chosen],
             self.chief,
             self.track,
+            self.late,
         )
 
 

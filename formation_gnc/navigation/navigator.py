@@ -447,23 +447,21 @@ class Navigator(Part[NavigationParameters, Design]):
                 flight.track,
             )
             if readings is not None:
+                admitted = len(readings.value)
                 before = flight.filter.x, flight.filter.P
-                passed, offset, variance, jacobian = self._weigh(flight, readings)
-                if passed.any():
-                    chosen = readings
-                    if not passed.all():
-                        chosen = readings.select(passed)
-                        offset, variance, jacobian = offset[passed], variance[passed], jacobian[passed]
-                    flight.observability.take(jacobian, chosen.variance)
-                    used = chosen.sensor.tolist()
+                weighed = self._weigh(flight, readings)
+                if weighed is not None:
+                    readings, offset, variance, jacobian = weighed
+                    flight.observability.take(jacobian, readings.variance)
+                    used = readings.sensor.tolist()
                     innovation, sigma = offset.tolist(), np.sqrt(variance).tolist()
-                    nis = flight.filter.correct(passed, self._pseudo(chosen))
+                    nis = flight.filter.correct(self._pseudo(readings))
                     flight.last_reading = flight.time
                 if not (kernels.sound(flight.filter.x, flight.filter.P) and isfinite(nis)):
                     flight.filter = FILTERS[self.parameters.filter](*before)
                     self._give_up(measurement.time, "update not finite")
                     return None
-                verdict, factor = flight.consistency.judge(nis, len(used), len(passed) - len(used))
+                verdict, factor = flight.consistency.judge(nis, len(used), admitted - len(used))
                 if verdict is Verdict.GIVE_UP:
                     self._give_up(measurement.time, "readings contradict the state, however uncertain")
                     return None
@@ -495,14 +493,13 @@ class Navigator(Part[NavigationParameters, Design]):
             blind=flight.observability.words,
         )
 
-    def _weigh(self, flight: Flight, readings: Readings) -> tuple[np.ndarray, Vector, Vector, Matrix]:
-        """Which readings pass the gate; all their innovations, the variances of these and the Jacobian."""
-        with np.errstate(all="ignore"):  # whatever a reading says; what comes of it is compared below
+    def _weigh(self, flight: Flight, readings: Readings) -> tuple[Readings, Vector, Vector, Matrix] | None:
+        """The readings that pass the gate, their innovations, the variances of these and the Jacobian."""
+        with np.errstate(all="ignore"):  # whatever a reading says; what comes of it is compared
             offset, variance, jacobian = flight.filter.weigh(readings)
             passed = offset * offset <= self.configuration.design.gate * variance
-        if passed.all():
-            return passed, offset, variance, jacobian
-        with np.errstate(all="ignore"):
+            if passed.all():
+                return readings, offset, variance, jacobian
             distance = np.abs(offset) / np.sqrt(variance)
         for index in np.flatnonzero(~passed).tolist():
             name = NAMES[Sensor(int(readings.sensor[index]))]
@@ -510,15 +507,15 @@ class Navigator(Part[NavigationParameters, Design]):
                 self._refusals.add(Refusal.GATE, name, f"{distance[index]:.1f} standard deviations off")
             else:
                 self._refusals.add(Refusal.NO_DIRECTION, name)
-        return passed, offset, variance, jacobian
+        if not passed.any():
+            return None
+        readings = readings.select(passed)
+        return readings, *flight.filter.weigh(readings)
 
     def _pseudo(self, readings: Readings) -> bool:
-        three = {int(Sensor.RADIUS), int(Sensor.RANGE_RATE), int(Sensor.LATITUDE)}
-        return (
-            self.parameters.pseudo_measurements
-            and three <= set(readings.sensor.tolist())
-            and not readings.age.any()
-        )
+        if not self.parameters.pseudo_measurements or readings.late:
+            return False
+        return {Sensor.RADIUS, Sensor.RANGE_RATE, Sensor.LATITUDE} <= set(readings.sensor.tolist())
 
     def _give_up(self, time: int, why: str) -> None:
         """Lose the state: without an estimate the tick is missed, and the next measurement has a fix."""

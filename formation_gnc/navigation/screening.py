@@ -89,6 +89,7 @@ class Screen:
             np.array([variance[sensor] for sensor in sensors]),
             chief,
             track,
+            any(ages),
         )
 
     def _fault(self, time: int, sensor: int, value: float, age: float, latest: float) -> Refusal | None:

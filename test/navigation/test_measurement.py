@@ -42,7 +42,8 @@ relatives = st.builds(
 
 
 def readings(chief: Vector, value: Vector, age: float = 0.0, track: Track | None = None) -> Readings:
-    return Readings(ALL, value, np.full(len(ALL), age), np.ones(len(ALL)), chief, track or Track(100))
+    ones = np.ones(len(ALL))
+    return Readings(ALL, value, age * ones, ones, chief, track or Track(100), age > 0.0)
 
 
 @given(chiefs, relatives)
