@@ -1,0 +1,81 @@
+"""The cache of compiled code: keyed by content, shared by processes, gone without where nothing is writable."""
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from formation_gnc.orbit import jit
+
+KERNEL = """
+from numba import float64
+from formation_gnc.orbit.jit import kernel
+
+@kernel(float64(float64))
+def twice(x):
+    return 2.0 * x
+
+print(twice(21.0), len(twice.stats.cache_hits))
+"""
+
+
+@pytest.fixture
+def roots(tmp_path, monkeypatch):
+    """Two places for the cache: that of numba's configuration, and the user's."""
+    monkeypatch.setattr(jit.numba.config, "CACHE_DIR", str(tmp_path / "configured"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "user"))
+    return tmp_path
+
+
+def test_cache_lies_where_numba_is_told(roots):
+    assert Path(jit._cache_directory()).parent == roots / "configured"
+
+
+def test_cache_goes_to_the_user_when_the_package_is_read_only(roots, monkeypatch):
+    """Root can write anywhere, so the refusal is played."""
+    write = tempfile.TemporaryFile
+
+    def refuse(dir):
+        if Path(dir).is_relative_to(roots / "user"):
+            return write(dir=dir)
+        raise PermissionError(dir)
+
+    monkeypatch.setattr(jit.tempfile, "TemporaryFile", refuse)
+    assert Path(jit._cache_directory()).parent == roots / "user" / "formation_gnc"
+
+
+def test_nothing_writable_means_no_cache(roots, monkeypatch):
+    def refuse(dir):
+        raise PermissionError(dir)
+
+    monkeypatch.setattr(jit.tempfile, "TemporaryFile", refuse)
+    assert jit._cache_directory() == ""
+
+
+def test_cache_changes_with_any_source(roots, monkeypatch, tmp_path):
+    """A constant in one file is compiled into kernels of another: neither may outlive the other."""
+    package = tmp_path / "package"
+    package.mkdir()
+    (package / "constants.py").write_text("MU = 1.0\n")
+    monkeypatch.setattr(jit, "_HERE", package)
+    before = jit._cache_directory()
+    assert jit._cache_directory() == before
+    (package / "constants.py").write_text("MU = 2.0\n")
+    assert jit._cache_directory() != before
+
+
+def test_processes_that_compile_at_once_do_not_disturb_one_another(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(KERNEL)
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    run = [sys.executable, str(script)]
+    together = [subprocess.Popen(run, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    for process in together:
+        output, _ = process.communicate(timeout=120)
+        assert output.startswith("42.0")
+        assert process.returncode == 0
+    again = subprocess.run(run, env=environment, capture_output=True, text=True, check=True, timeout=120)
+    assert again.stdout == "42.0 1\n"
