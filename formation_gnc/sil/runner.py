@@ -29,16 +29,25 @@ class Satellite:
 
     def on_tick(self, measurement: Any, sink: Sink) -> Thrust | None:
         """From measurement to thrust; none when there is no estimate to act on."""
+        thrust = self._answer(measurement, sink)
+        for part in self.parts:
+            for event in part.take_events():
+                sink("/events", event)
+        return thrust
+
+    def _answer(self, measurement: Any, sink: Sink) -> Thrust | None:
         estimate = self.navigator.on_tick(measurement)
         if estimate is None:
             return None
         target = self.guide.on_tick(estimate)
         thrust, status = self.autopilot.on_tick(estimate, target)
-        for topic, record in (("estimate", estimate), ("target", target), ("thrust", thrust), ("status", status)):
+        for topic, record in (
+            ("estimate", estimate),
+            ("target", target),
+            ("thrust", thrust),
+            ("status", status),
+        ):
             sink(f"/{self.name}/{topic}", record)
-        for part in self.parts:
-            for event in part.take_events():
-                sink("/events", event)
         return thrust
 
 
@@ -62,7 +71,10 @@ class Run:
             thrust = satellite.on_tick(measurement, sink)
             if thrust is not None:
                 forces[satellite.name] = thrust.force
-        self.misses += len(self.plant.step(forces))
+        tick, time = self.plant.tick, self.plant.time
+        for name in self.plant.step(forces):
+            sink("/events", Event(time, tick, "/plant", "miss", f"{name} gave no answer: no thrust"))
+            self.misses += 1
 
     def fly(self, sink: Sink) -> None:
         """Fly to the end."""

@@ -68,10 +68,8 @@ def bits(value: Any) -> Any:
 @given(st.sampled_from(RECORDS).flatmap(records))
 def test_a_record_comes_back_from_the_wire_bit_for_bit(record: Any) -> None:
     kind = message_type(type(record))
-    wire = serialize_message(to_message(record))
-    returned = from_message(type(record), deserialize_message(wire, kind))
-    assert bits(returned) == bits(record)
-    assert serialize_message(to_message(returned)) == wire
+    received = deserialize_message(serialize_message(to_message(record)), kind)
+    assert bits(from_message(type(record), received)) == bits(record)
 
 
 @pytest.mark.parametrize("record", RECORDS)
