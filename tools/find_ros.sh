@@ -2,6 +2,11 @@
 # Prints the prefix of the ROS 2 Jazzy that is sourced or installed, or "wheels" where there is none.
 set -euo pipefail
 
+if [[ $PWD == *[[:space:]]* ]]; then
+    echo "formation_gnc: '$PWD' has a space in it, which the first line of a Python script cannot name: move it." >&2
+    exit 2
+fi
+
 if [[ ${ROS_DISTRO:-jazzy} != jazzy ]]; then
     echo "formation_gnc: needs ROS 2 Jazzy, but this shell has ROS $ROS_DISTRO sourced: use a shell without it." >&2
     exit 2
