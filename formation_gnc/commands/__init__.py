@@ -1,5 +1,5 @@
 """Subcommands of `formation-gnc`, one module each: a docstring for its help, `add_arguments` and `run`."""
 
-from formation_gnc.commands import sil
+from formation_gnc.commands import navigate, sil
 
-COMMANDS = {"sil": sil}
+COMMANDS = {"sil": sil, "navigate": navigate}
