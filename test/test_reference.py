@@ -1,0 +1,39 @@
+from typing import Any
+
+import pytest
+
+from formation_gnc.parameters import dump, leaves, load
+from formation_gnc.reference import PAGE, SCHEMAS, page
+
+NEEDED = {
+    "chief.semi_major_axis": 7.0e6,
+    "duration": 100.0,
+    "deputy1.relative_state": (0.0, -100.0, 0.0, 0.0, 0.0, 0.0),
+}
+
+
+def test_the_page_of_parameters_is_up_to_date() -> None:
+    assert PAGE.read_text() == page(), "run `python -m formation_gnc.reference` and commit docs/reference"
+
+
+@pytest.mark.parametrize("node", SCHEMAS)
+def test_every_parameter_says_what_it_means_and_its_default_is_allowed(node: str) -> None:
+    for leaf in leaves(SCHEMAS[node], {}):
+        assert leaf.limits.doc, f"{leaf.name} has no meaning"
+        assert not leaf.limits.doc.endswith("."), f"the meaning of {leaf.name} is a phrase, not a sentence"
+        if leaf.name not in NEEDED:
+            assert leaf.check(leaf.default) == leaf.default
+
+
+@pytest.mark.parametrize("node", SCHEMAS)
+def test_a_node_can_be_made_from_what_must_be_given_alone(node: str) -> None:
+    names = {leaf.name for leaf in leaves(SCHEMAS[node], {})}
+    values: Any = load(SCHEMAS[node], {name: value for name, value in NEEDED.items() if name in names})
+    assert set(dump(values)) == names
+
+
+@pytest.mark.parametrize("node", SCHEMAS)
+def test_the_page_has_every_parameter_of_every_node(node: str) -> None:
+    text = page()
+    for leaf in leaves(SCHEMAS[node], {"deputies": ["DEPUTY"]}):
+        assert f"| `{leaf.name}` | {leaf.type_name} |" in text
