@@ -43,6 +43,7 @@ def _advance(
 ) -> tuple[Array, int]:
     """States after a tick, and the first satellite that is no longer above the surface, or -1."""
     step = tick / substeps
+    coupling, weights = COUPLING.copy(), WEIGHTS.copy()  # constants would be unrolled: seconds to compile
     satellites = states.shape[0]
     now = np.empty((satellites, 6))
     now[:, :] = states
@@ -61,7 +62,7 @@ def _advance(
                 for c in range(6):
                     change = 0.0
                     for j in range(i):
-                        change += COUPLING[i, j] * rates[j, c]
+                        change += coupling[i, j] * rates[j, c]
                     stage[c] = now[satellite, c] + step * change
                 x, y, z, vx, vy, vz = stage
                 ax, ay, az = acceleration(
@@ -74,7 +75,7 @@ def _advance(
             for c in range(6):
                 change = 0.0
                 for i in range(STAGES):
-                    change += WEIGHTS[i] * rates[i, c]
+                    change += weights[i] * rates[i, c]
                 now[satellite, c] += step * change
     for satellite in range(satellites):
         x, y, z = now[satellite, 0], now[satellite, 1], now[satellite, 2]
@@ -196,6 +197,7 @@ def advance_with_transition(
         The state, (6,), and its derivative with respect to the state at the start, (6, 6).
     """
     step = tick / substeps
+    coupling, weights = COUPLING.copy(), WEIGHTS.copy()  # constants would be unrolled: seconds to compile
     now = np.empty((7, 6))  # the state, then the columns of the transition matrix
     now[0] = state
     now[1:] = np.eye(6)
@@ -207,7 +209,7 @@ def advance_with_transition(
                 for c in range(6):
                     change = 0.0
                     for j in range(i):
-                        change += COUPLING[i, j] * rates[j, row, c]
+                        change += coupling[i, j] * rates[j, row, c]
                     stage[row, c] = now[row, c] + step * change
             x, y, z = stage[0, 0], stage[0, 1], stage[0, 2]
             ax, ay, az = oblate_acceleration(x, y, z)
@@ -225,6 +227,6 @@ def advance_with_transition(
             for c in range(6):
                 change = 0.0
                 for i in range(STAGES):
-                    change += WEIGHTS[i] * rates[i, row, c]
+                    change += weights[i] * rates[i, row, c]
                 now[row, c] += step * change
     return now[0].copy(), now[1:].T.copy()

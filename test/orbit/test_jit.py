@@ -1,4 +1,4 @@
-"""The cache of compiled code: keyed by content, shared by processes, gone without where nothing is writable."""
+"""The cache of compiled code: keyed by content, shared by processes, done without if nothing is writable."""
 
 import os
 import subprocess
