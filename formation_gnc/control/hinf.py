@@ -112,8 +112,8 @@ class HInfinityController(Controller):
     are set anew: of all states that give just the force that flies, those from which the closed loop costs
     least.
 
-    Assumes: near-circular chief, separation much smaller than its radius, a target that needs little thrust to
-    follow, an error that the thrusters can answer: far beyond, no linear law of high gain recovers.
+    Assumes: near-circular chief, separation much smaller than its radius, a target that needs little thrust
+    to follow, an error that the thrusters can answer: far beyond, no linear law of high gain recovers.
     """
 
     Parameters = HinfParameters

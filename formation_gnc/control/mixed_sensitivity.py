@@ -12,10 +12,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import slycot  # type: ignore[import-untyped]
 from scipy.linalg import expm, solve_continuous_are
 
 from formation_gnc.errors import DesignError
 from formation_gnc.interface import Matrix, Vector
+
+LARGEST_GAMMA = 1e6
+
+ACCURACY = 1e-3
+"""To which the best gamma is found, relative to it."""
 
 
 @dataclass(frozen=True)
@@ -129,10 +135,6 @@ class Problem:
         return a, b, c, self.effort * rate**2, self.disturbance / rate**2
 
     def _output_feedback(self, margin: float) -> tuple[LinearController, float, float]:
-        # Imported here: with Matplotlib behind them, they would cost every other law a second at the start.
-        import control
-        import slycot  # type: ignore[import-untyped]
-
         a, b2, c1, effort, disturbance = self._scaled()
         eye, nil = np.eye(3), np.zeros((3, 3))
         channels = np.vstack([nil, nil, eye, nil])
@@ -142,10 +144,33 @@ class Problem:
         d[:3, 3:6] = np.diag(self.performance.direct)
         d[6:9, 6:] = np.diag(effort)
         d[9:, 3:6] = eye
-        _, _, best, _ = control.hinfsyn(control.ss(a, b, c, d), 3, 3)
-        gamma = (1.0 + margin) * best
-        ak, bk, ck, dk, _ = slycot.sb10fd(12, 9, 12, 3, 3, gamma, a, b, c, d)
-        return self._unscaled(ak, bk, ck, dk, np.ones(3)), best, gamma
+
+        def central(gamma: float) -> LinearController | None:
+            try:
+                ak, bk, ck, dk, _ = slycot.sb10fd(12, 9, 12, 3, 3, gamma, a, b, c, d)
+            except slycot.exceptions.SlycotError:
+                return None
+            # SB10FD leaves a condition unchecked, without which its controller does not stabilise.
+            loop = np.block([[a + b2 @ dk @ c[9:], b2 @ ck], [bk @ c[9:], ak]])
+            stable = np.isfinite(loop).all() and (np.linalg.eigvals(loop).real < 0.0).all()
+            return self._unscaled(ak, bk, ck, dk, np.ones(3)) if stable else None
+
+        # By bisection, not by SLICOT's own search: that one call would keep all other threads waiting for a
+        # second.
+        high = 1.0
+        while central(high) is None:
+            high *= 2.0
+            if high > LARGEST_GAMMA:
+                raise ArithmeticError(f"none up to gamma = {high:.3g}")
+        low = 0.0 if high == 1.0 else 0.5 * high
+        while high - low > ACCURACY * high:
+            middle = 0.5 * (high + low)
+            high, low = (high, middle) if central(middle) is None else (middle, low)
+        gamma = (1.0 + margin) * high
+        controller = central(gamma)
+        if controller is None:
+            raise ArithmeticError(f"none at gamma = {gamma:.3g}")
+        return controller, high, gamma
 
     def _full_information(self, margin: float) -> tuple[LinearController, float, float]:
         a, b, c, effort, disturbance = self._scaled()

@@ -70,6 +70,18 @@ def test_every_channel_keeps_its_bound_at_every_frequency(parameters):
     assert (values["S"].max(axis=1) * performance[:, 0]).max() > 0.5 * law.best_gamma
 
 
+def test_the_best_gamma_is_that_of_python_control():
+    control = pytest.importorskip("control")
+    problem = fresh("output").problem
+    a, b2, c1, effort, disturbance = problem._scaled()
+    b = np.hstack([disturbance * b2, np.eye(12)[:, 6:9], b2])
+    d = np.zeros((12, 9))
+    d[:3, 3:6], d[6:9, 6:], d[9:, 3:6] = np.diag(problem.performance.direct), np.diag(effort), np.eye(3)
+    plant = control.ss(a, b, np.vstack([c1, np.zeros((3, 12)), np.eye(3, 12)]), d)
+    _, _, theirs, _ = control.hinfsyn(plant, 3, 3)
+    assert fresh("output").best_gamma == pytest.approx(theirs, rel=2e-3)  # to which ours is searched
+
+
 def test_full_information_keeps_its_gamma_against_an_acceleration():
     law = HInfinityController(
         neokleous(shift=0.0, disturbance=1e-5, form="full_information"), GEO, vehicle(1.0)
