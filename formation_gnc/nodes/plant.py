@@ -109,6 +109,9 @@ class PlantNode(ConfiguredNode):
             self.get_logger().warning(f"tick {tick}: miss: {detail}")
             self._tell_event(time, tick, "miss", detail)
             self._misses += 1
+        for event in self.plant.take_events():
+            self.get_logger().info(f"tick {event.tick}: {event.kind}: {event.detail}")
+            self._events.publish(to_message(event))
         if self.plant.finished:
             detail = f"{self.plant.tick} ticks flown, {self._misses} missed"
             self._tell_event(self.plant.time, self.plant.tick, "end", detail)

@@ -32,6 +32,7 @@ from formation_gnc.errors import ConfigurationError
 from formation_gnc.interface import Event
 from formation_gnc.nodes import topics
 from formation_gnc.nodes.conversion import from_message, message_type, to_message
+from formation_gnc.orbit.propagation import ImpactError
 from formation_gnc.parameters import Leaf, dump, leaves, load
 from formation_gnc.part import Part
 
@@ -216,7 +217,7 @@ def run(make_node: Callable[[], ConfiguredNode], fly: Callable[[Any], None] = Co
     Signals only set `STOP`, since a node that has been asked to stop still has to hand over what it published or recorded.
 
     Returns:
-        0 after an ordinary end or an interruption, 2 when something given to the node is not allowed.
+        0 after an ordinary end or an interruption, 1 when a satellite came down, 2 when something given to the node is not allowed.
     """
     node = None
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -228,6 +229,9 @@ def run(make_node: Callable[[], ConfiguredNode], fly: Callable[[Any], None] = Co
     except (ConfigurationError, *REFUSED_BY_ROS) as refusal:
         print(f"{Path(sys.argv[0]).name}: {' '.join(str(refusal).split())}", file=sys.stderr)
         return 2
+    except ImpactError as impact:
+        print(f"{Path(sys.argv[0]).name}: {impact}", file=sys.stderr)
+        return 1
     finally:
         if node is not None:
             node.destroy_node()

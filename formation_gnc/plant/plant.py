@@ -1,39 +1,33 @@
 """The truth of a run: chief and deputies, what drives them and what they measure."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.interface import NANOSECONDS, Measurement, SatelliteTruth, Truth, Vector
+from formation_gnc.interface import NANOSECONDS, Event, Measurement, SatelliteTruth, Truth, Vector
 from formation_gnc.mission import LAST_SECOND, Mission
 from formation_gnc.orbit.constants import EARTH_RADIUS
-from formation_gnc.orbit.elements import Elements, state_from_elements
+from formation_gnc.orbit.elements import Elements, elements_from_state, state_from_elements
 from formation_gnc.orbit.frames import hill_rotation, inertial_from_relative, relative_from_inertial
+from formation_gnc.orbit.forces import Body, Forces
 from formation_gnc.orbit.propagation import Propagator
 from formation_gnc.parameters import parameter, per_name
 from formation_gnc.plant.sensors import Sensors, SensorSuite
+from formation_gnc.plant.thrusters import Denial, Thruster, ThrusterParameters, ThrusterState
+from formation_gnc.randomness import generator
 
-LONGEST_STEP = 10.0
-"""Integration step (s) above which a tick is divided: of order eight, it keeps an orbit in LEO below 1 mm."""
 
-
-@dataclass(frozen=True)
-class DeputyParameters:
-    """One deputy: where it starts, what it weighs, how it pushes and what it sees."""
+@dataclass(frozen=True, kw_only=True)
+class DeputyParameters(Body):
+    """One deputy: where it starts, what the forces act on, how it pushes and what it sees."""
 
     relative_state: tuple[float, ...] = parameter(
-        unit="m, m/s",
-        length=6,
-        minimum=-1e9,
-        maximum=1e9,
-        doc="true state at the start relative to the chief, Hill frame",
+        unit="m, m/s", length=6, doc="true state at the start relative to the chief, Hill frame"
     )
-    mass: float = parameter(100.0, unit="kg", above=0.0, doc="mass")
-    thrust_limit: tuple[float, ...] = parameter(
-        (0.01, 0.01, 0.01), unit="N", length=3, minimum=0.0, doc="largest force per Hill axis"
-    )
+    thrusters: ThrusterParameters = ThrusterParameters()
     sensors: SensorSuite = SensorSuite()
 
 
@@ -54,6 +48,14 @@ class PlantParameters(Mission):
         above=0.0,
         doc="wall time a deputy has for its answer before it gets no thrust for the tick",
     )
+    epoch: float = parameter(
+        0.0, unit="s", doc="Terrestrial Time at the start of the run since J2000.0; it places Sun, Moon and Greenwich"
+    )
+    step: float = parameter(
+        10.0, unit="s", above=0.0, doc="longest integration step, of order eight; a longer tick is divided"
+    )
+    forces: Forces = Forces()
+    chief_body: Body = Body()
     wait_for_recorder: bool = parameter(False, doc="do not start before a recorder listens to everything")
     deputies: tuple[str, ...] = parameter(("deputy1",), doc="names of the deputies, each a namespace")
     deputy: dict[str, DeputyParameters] = per_name("deputies")
@@ -82,37 +84,55 @@ class PlantParameters(Mission):
         return -(-round(self.duration * NANOSECONDS) // self.tick_ns)
 
 
+@dataclass
+class _Satellite:
+    """A deputy in flight, besides its inertial state."""
+
+    name: str
+    sensors: Sensors
+    thruster: Thruster
+    state: ThrusterState
+    force: Vector
+    """Given over the tick before, Hill frame at its start, N."""
+    eclipse: bool = False
+    missed: bool = True
+    denied: tuple[Denial, ...] = ()
+
+
 class Plant:
-    """Two-body plus J2 truth in the inertial frame, with thrust held over each tick.
+    """Truth of chief and deputies in the inertial frame, under the forces in `parameters`.
 
     Use: at every tick `observe`, then `step` with the deputies' forces. Thrust acts along the Hill axes at
     the tick's start, fixed in inertial space over the tick.
     """
 
     def __init__(self, parameters: PlantParameters) -> None:
-        """Place chief and deputies; raises ConfigurationError for one below the Earth's surface."""
+        """Place chief and deputies; raises ConfigurationError for one that cannot fly."""
         self.parameters = parameters
         self.tick = 0
+        self._events: list[Event] = []
         chief = state_from_elements(Elements(**vars(parameters.chief)))
-        self._names = parameters.deputies
-        deputies = [parameters.deputy[name] for name in self._names]
         self._states = np.array(
-            [chief, *(inertial_from_relative(chief, np.array(deputy.relative_state)) for deputy in deputies)]
+            [chief, *(_start(chief, name, parameters.deputy[name]) for name in parameters.deputies)]
         )
-        for name, radius in zip(self._names, np.linalg.norm(self._states[1:, :3], axis=1), strict=True):
-            if radius < EARTH_RADIUS:
-                raise ConfigurationError(
-                    f"{name}: it starts at radius {radius:.6g} m, and must be above {EARTH_RADIUS:g} m"
-                )
-        self._masses = [deputy.mass for deputy in deputies]
-        self._limits = [np.array(deputy.thrust_limit) for deputy in deputies]
-        self._forces = [np.zeros(3) for _ in deputies]
-        self._missed = [True for _ in deputies]
-        self._sensors = [
-            Sensors(deputy.sensors, parameters.tick_ns, parameters.seed, name)
-            for name, deputy in zip(self._names, deputies, strict=True)
-        ]
-        self._propagator = Propagator(parameters.tick, substeps=max(1, round(parameters.tick / LONGEST_STEP)))
+        self._satellites = [self._satellite(name, parameters.deputy[name]) for name in parameters.deputies]
+        self._propagator = Propagator(
+            parameters.tick,
+            math.ceil(parameters.tick / parameters.step),
+            parameters.forces,
+            [parameters.chief_body, *(parameters.deputy[name] for name in parameters.deputies)],
+            parameters.epoch,
+        )
+
+    def _satellite(self, name: str, deputy: DeputyParameters) -> _Satellite:
+        parameters = self.parameters
+        try:
+            sensors = Sensors(deputy.sensors, parameters.tick_ns, parameters.seed, name)
+            random = generator(parameters.seed, f"{name}/thrusters")
+            thruster = Thruster(deputy.thrusters, parameters.tick, random)
+            return _Satellite(name, sensors, thruster, thruster.start(deputy.mass), np.zeros(3))
+        except ConfigurationError as error:
+            raise ConfigurationError(f"{name}: {error}") from None
 
     @property
     def time(self) -> int:
@@ -129,44 +149,81 @@ class Plant:
         chief = self._states[0]
         truth = Truth(self.time, chief, [])
         measurements = {}
-        for index, name in enumerate(self._names):
-            state, force, mass = self._states[index + 1], self._forces[index], self._masses[index]
+        for satellite, state in zip(self._satellites, self._states[1:], strict=True):
             relative = relative_from_inertial(chief, state)
-            truth.deputies.append(SatelliteTruth(name, state, relative, force, mass, False))
-            sensors, readings, ages = self._sensors[index].readings(self.tick, state, chief)
-            missed = self._missed[index]
-            measurements[name] = Measurement(
+            satellite.eclipse = self._propagator.illumination(self.time / NANOSECONDS, state) < 1.0
+            mass = satellite.state.mass
+            truth.deputies.append(
+                SatelliteTruth(satellite.name, state, relative, satellite.force, mass, satellite.eclipse)
+            )
+            sensors, readings, ages = satellite.sensors.readings(self.tick, state, chief)
+            measurements[satellite.name] = Measurement(
                 time=self.time,
                 chief_state=chief,
                 sensor=sensors,
                 reading=readings,
                 age=ages,
-                applied_force=force,
+                applied_force=satellite.force,
                 mass=mass,
-                eclipse=False,
-                fix_available=missed,
-                fix=self._sensors[index].fix(relative) if missed else np.zeros(6),
-                deputy=name,
+                eclipse=satellite.eclipse,
+                fix_available=satellite.missed,
+                fix=satellite.sensors.fix(relative) if satellite.missed else np.zeros(6),
+                deputy=satellite.name,
             )
         return truth, measurements
 
     def step(self, forces: Mapping[str, Vector]) -> list[str]:
-        """Fly one tick under the deputies' forces (3,), Hill frame, N.
+        """Fly one tick under the deputies' forces (3,), Hill frame, N; after `observe`.
 
         A deputy without an entry, or with a force that is not finite, missed the tick: it gets no thrust, and
         a fix with its next measurement, since it may have lost its state.
 
         Returns:
             Names of the deputies that missed the tick.
+
+        Raises:
+            ImpactError: a satellite has come down.
         """
         rotation = hill_rotation(self._states[0])
-        accelerations = np.zeros((len(self._names) + 1, 3))
-        for index, name in enumerate(self._names):
-            force = forces.get(name)
-            self._missed[index] = force is None or not np.isfinite(force).all()
-            limit = self._limits[index]
-            self._forces[index] = np.zeros(3) if self._missed[index] else np.clip(force, -limit, limit)
-            accelerations[index + 1] = self._forces[index] @ rotation / self._masses[index]
-        self._states = self._propagator.advance(self.time / NANOSECONDS, self._states, accelerations)
+        accelerations = np.zeros_like(self._states[:, :3])
+        masses = np.array([self.parameters.chief_body.mass, *(each.state.mass for each in self._satellites)])
+        for satellite, acceleration, mass in zip(self._satellites, accelerations[1:], masses[1:], strict=True):
+            force = forces.get(satellite.name)
+            satellite.missed = force is None or not np.isfinite(force).all()
+            satellite.force, satellite.state, denied = satellite.thruster.apply(
+                np.zeros(3) if force is None else force, satellite.eclipse, satellite.state
+            )
+            self._note(satellite, tuple(reason for reason in denied if reason is not Denial.NOT_FINITE))
+            acceleration[:] = satellite.force @ rotation / mass
+        self._states = self._propagator.advance(self.time / NANOSECONDS, self._states, accelerations, masses)
         self.tick += 1
-        return [name for name, missed in zip(self._names, self._missed, strict=True) if missed]
+        return [satellite.name for satellite in self._satellites if satellite.missed]
+
+    def _note(self, satellite: _Satellite, denied: tuple[Denial, ...]) -> None:
+        """Note it when the reasons change for which a deputy's thrusters do not give what is asked."""
+        if denied != satellite.denied:
+            satellite.denied = denied
+            detail = f"{satellite.name}: {', '.join(denied) or 'as commanded again'}"
+            self._events.append(Event(self.time, self.tick, "/plant", "thrusters", detail))
+
+    def take_events(self) -> list[Event]:
+        """The events noted since they were last taken."""
+        events, self._events = self._events, []
+        return events
+
+
+def _start(chief: Vector, name: str, deputy: DeputyParameters) -> Vector:
+    """Inertial state (6,) of a deputy at the start; raises ConfigurationError for an orbit that cannot be flown."""
+    relative = np.array(deputy.relative_state)
+    if not relative[:3].any():
+        raise ConfigurationError(
+            f"parameter {name}.relative_state: {relative.tolist()} is not allowed; its position must be off the chief's"
+        )
+    state = inertial_from_relative(chief, relative)
+    try:
+        elements_from_state(state)
+    except ConfigurationError as error:
+        raise ConfigurationError(
+            f"parameter {name}.relative_state: {relative.tolist()} is not allowed; its orbit has {error}"
+        ) from None
+    return state

@@ -75,6 +75,8 @@ class Run:
         for name in self.plant.step(forces):
             sink("/events", Event(time, tick, "/plant", "miss", f"{name} gave no answer: no thrust"))
             self.misses += 1
+        for event in self.plant.take_events():
+            sink("/events", event)
 
     def fly(self, sink: Sink) -> None:
         """Fly to the end."""
