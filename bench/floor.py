@@ -5,11 +5,13 @@ message made beforehand and only stamped. Run as ``python -m bench.floor ROLE TI
 """
 
 import sys
+from contextlib import suppress
 from time import perf_counter
 from typing import Any
 
 import formation_gnc_msgs.msg as messages
 import rclpy
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
@@ -106,4 +108,5 @@ def main(role: str, ticks: int) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]))
+    with suppress(ExternalShutdownException):
+        main(sys.argv[1], int(sys.argv[2]))

@@ -1,7 +1,6 @@
 """The lock-step graph beside its floor, the in-process runner, and what recording costs either."""
 
 import os
-import signal
 import subprocess
 import sys
 import tempfile
@@ -32,7 +31,7 @@ def floor() -> float:
             answer = subprocess.run(commands[-1], env=environment, capture_output=True, text=True, check=True)
         finally:
             for relay in relays:
-                relay.send_signal(signal.SIGINT)
+                relay.terminate()
                 relay.wait()
     return float(answer.stdout)
 

@@ -193,9 +193,10 @@ def fly(
 ) -> tuple[Array, Array, Array]:
     """One prediction of the extended Kalman filter, exact in the motion.
 
-    The deputy flies in the inertial frame beside the chief's ephemeris, so that neither a circular chief
-    nor a small separation is assumed; the transition is that of the inertial flight, seen in the Hill
-    frames at both ends.
+    The deputy flies in the inertial frame beside the chief, so that neither a circular chief nor a small
+    separation is assumed; the transition is that of the inertial flight, seen in the Hill frames at both
+    ends, which the ephemeris gives. Their difference is taken between the two as the model flies them: a
+    force that it leaves out (Sun, Moon, drag) then counts only as far as it differs between the two.
 
     Args:
         chief: inertial state at the start, (6,), m and m/s.
@@ -218,7 +219,7 @@ def fly(
     next_axes, next_rate = _hill(next_chief)
     transition = _product(_product(_transform(next_axes, next_rate), flight), _transform_inverse(axes, rate))
     return (
-        _to_relative(next_axes, next_rate, next_chief, deputy),
+        _to_relative(next_axes, next_rate, _coast(chief, 0.0, 0.0, 0.0, tick, substeps), deputy),
         _congruence(transition, covariance, noise),
         transition,
     )
@@ -234,12 +235,13 @@ def fly_points(
     for c in range(3):
         thrust[c] = acceleration[0] * axes[0, c] + acceleration[1] * axes[1, c] + acceleration[2] * axes[2, c]
     next_axes, next_rate = _hill(next_chief)
+    flown = _coast(chief, 0.0, 0.0, 0.0, tick, substeps)
     out = np.empty((points.shape[0], 6))
     for index in range(points.shape[0]):
         deputy = _coast(
             _to_inertial(axes, rate, chief, points[index]), thrust[0], thrust[1], thrust[2], tick, substeps
         )
-        out[index] = _to_relative(next_axes, next_rate, next_chief, deputy)
+        out[index] = _to_relative(next_axes, next_rate, flown, deputy)
     return out
 
 

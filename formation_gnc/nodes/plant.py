@@ -61,6 +61,7 @@ class PlantNode(ConfiguredNode):
         self._answered_before: set[str] = set()
         self._flying = False
         self._recorded: int | None = None
+        self._recorder_is_there = False
         self._held = False
         self._misses = 0
         self._started = self._tick_started = self._reported = monotonic()
@@ -80,6 +81,7 @@ class PlantNode(ConfiguredNode):
             self._started = monotonic()
             return self._publish_tick()
         now = monotonic()
+        self._recorder_is_there = self.count_publishers(topics.RECORDED) > 0
         late = sorted(self._awaited & self._answered_before)
         if late and now - self._tick_started > self.values.deadline:
             self._awaited -= set(late)
@@ -149,7 +151,7 @@ class PlantNode(ConfiguredNode):
 
     def _recorder_keeps_up(self) -> bool:
         lag = self.plant.time - (self._recorded or 0)
-        self._held = lag > RECORDER_LAG * self.values.tick_ns and self.count_publishers(topics.RECORDED) > 0
+        self._held = self._recorder_is_there and lag > RECORDER_LAG * self.values.tick_ns
         return not self._held
 
     def wait_for_recorder(self) -> bool:

@@ -57,7 +57,7 @@ class ThrusterParameters:
     dry_mass: float = parameter(0.0, unit="kg", minimum=0.0, doc="mass at which the tank is empty")
     off_in_eclipse: bool = parameter(False, doc="no thrust while any of the Sun is hidden")
     failed: tuple[bool, ...] = parameter(
-        (False, False, False), length=3, in_flight=True, doc="axes whose thruster does not fire"
+        (False, False, False), length=3, doc="axes whose thruster does not fire"
     )
 
 

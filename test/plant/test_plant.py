@@ -127,7 +127,7 @@ def test_the_truth_and_the_measurement_report_the_force_of_the_tick_before() -> 
 
 
 def test_a_force_beyond_the_limit_is_cut_on_each_axis() -> None:
-    cut, within = plant(deputy1__thrust_limit=[0.01, 0.0, 0.02]), plant()
+    cut, within = plant(deputy1__thrusters__limit=[0.01, 0.0, 0.02]), plant()
     cut.step({"deputy1": np.array([-5.0, 0.003, 0.002])})
     within.step({"deputy1": np.array([-0.01, 0.0, 0.002])})
     one, other = cut.observe()[0].deputies[0], within.observe()[0].deputies[0]
