@@ -35,7 +35,11 @@ OUTPUTS = {
         (messages.Status, topics.STATUS),
         (messages.Timing, topics.TIMING),
     ],
-    "plant": [(messages.Measurement, topics.MEASUREMENT), (messages.Truth, topics.TRUTH), (Clock, topics.CLOCK)],
+    "plant": [
+        (messages.Measurement, topics.MEASUREMENT),
+        (messages.Truth, topics.TRUTH),
+        (Clock, topics.CLOCK),
+    ],
 }
 
 
@@ -57,7 +61,10 @@ class Relay(Node):  # type: ignore[misc]
         self.stamps: dict[str, int] = {}
         for kind, topic in INPUTS[role]:
             self.create_subscription(
-                kind, topic, lambda message, topic=topic: self.receive(topic, message), topics.quality(topics.LATEST)
+                kind,
+                topic,
+                lambda message, topic=topic: self.receive(topic, message),
+                topics.quality(topics.LATEST),
             )
 
     def receive(self, topic: str, message: Any) -> None:

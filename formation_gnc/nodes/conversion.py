@@ -22,7 +22,7 @@ FRAME_IDS = {
 }
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, slots=True)
 class _Field:
     """How one field of a record becomes a field of its message, and back; None leaves the value as it is."""
 
@@ -37,10 +37,10 @@ def message_type(record_type: type) -> Any:
     return getattr(messages, record_type.__name__)
 
 
-def to_message(record: Any) -> Any:
-    """A ROS message with the contents of a record, its header included."""
+def to_message(record: Any, message: Any = None) -> Any:
+    """A ROS message with the contents of a record, its header included; an old `message` may be used again."""
     kind = type(record)
-    message = message_type(kind)()
+    message = message or message_type(kind)()
     for field in _fields(kind):
         value = getattr(record, field.name)
         setattr(message, field.name, field.encode(value) if field.encode else value)
@@ -54,7 +54,9 @@ def to_message(record: Any) -> Any:
 def from_message[T](record_type: type[T], message: Any) -> T:
     """The record with the contents of a ROS message."""
     values = {
-        field.name: field.decode(getattr(message, field.name)) if field.decode else getattr(message, field.name)
+        field.name: field.decode(getattr(message, field.name))
+        if field.decode
+        else getattr(message, field.name)
         for field in _fields(record_type)
     }
     if hasattr(message, "header"):
@@ -72,9 +74,7 @@ def stamp(message: Any) -> int:
 def _fields(record_type: type) -> tuple[_Field, ...]:
     hints = get_type_hints(record_type)
     return tuple(
-        _field(field, hints[field.name])
-        for field in dataclasses.fields(record_type)
-        if field.name != "time"
+        _field(field, hints[field.name]) for field in dataclasses.fields(record_type) if field.name != "time"
     )
 
 

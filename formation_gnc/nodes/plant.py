@@ -12,7 +12,7 @@ from rosgraph_msgs.msg import Clock
 
 from formation_gnc.interface import NANOSECONDS, Event, Measurement, Thrust, Truth, Vector
 from formation_gnc.nodes import topics
-from formation_gnc.nodes.conversion import from_message, message_type, to_message
+from formation_gnc.nodes.conversion import from_message
 from formation_gnc.nodes.shell import STOP, ConfiguredNode, run
 from formation_gnc.plant.plant import Plant, PlantParameters
 
@@ -42,10 +42,10 @@ class PlantNode(ConfiguredNode):
         self.plant = Plant(self.values)
         self.done = Future()
         self._measurement = {
-            name: self._publisher(Measurement, f"/{name}/{topics.MEASUREMENT}") for name in self.values.deputies
+            name: self.speak(Measurement, f"/{name}/{topics.MEASUREMENT}") for name in self.values.deputies
         }
-        self._truth = self._publisher(Truth, topics.TRUTH)
-        self._events = self._publisher(Event, topics.EVENTS)
+        self._truth = self.speak(Truth, topics.TRUTH)
+        self._events = self.speak(Event, topics.EVENTS)
         self._tell_time = self.create_publisher(Clock, topics.CLOCK, topics.quality())
         self._diagnostics = self.create_publisher(DiagnosticArray, topics.DIAGNOSTICS, topics.quality())
         for name in self.values.deputies:
@@ -66,9 +66,6 @@ class PlantNode(ConfiguredNode):
         self._misses = 0
         self._started = self._tick_started = self._reported = monotonic()
         self._said = ""
-
-    def _publisher(self, record: type, topic: str) -> Any:
-        return self.create_publisher(message_type(record), topic, topics.quality())
 
     def check(self) -> None:
         """Do what no message triggers: start, deadlines, pace, a recorder that lags, reports."""
@@ -92,7 +89,12 @@ class PlantNode(ConfiguredNode):
             self._report("flying")
 
     def _advance_if_ready(self) -> None:
-        if not self._awaited and not self.done.done() and self._recorder_keeps_up() and self._wait_for_pace() <= 0.0:
+        if (
+            not self._awaited
+            and not self.done.done()
+            and self._recorder_keeps_up()
+            and self._wait_for_pace() <= 0.0
+        ):
             self._advance()
 
     def _on_thrust(self, name: str, message: Any) -> None:
@@ -113,7 +115,7 @@ class PlantNode(ConfiguredNode):
             self._misses += 1
         for event in self.plant.take_events():
             self.get_logger().info(f"tick {event.tick}: {event.kind}: {event.detail}")
-            self._events.publish(to_message(event))
+            self._events(event)
         if self.plant.finished:
             detail = f"{self.plant.tick} ticks flown, {self._misses} missed"
             self._tell_event(self.plant.time, self.plant.tick, "end", detail)
@@ -126,23 +128,24 @@ class PlantNode(ConfiguredNode):
         if name in self._forces:
             return f"commanded {self._forces[name].tolist()} N"
         absent = [node for node in self._missing() if node.startswith(f"/{name}/")]
-        where = f" ({', '.join(absent)} not there)" if absent else ""  # a killed node is missed by DDS only later
+        where = (
+            f" ({', '.join(absent)} not there)" if absent else ""
+        )  # a killed node is missed by DDS only later
         return f"did not answer within {self.values.deadline:g} s{where}"
 
     def _publish_tick(self) -> None:
         self._forces = {}
         self._awaited = set(self.values.deputies)
         self._tick_started = monotonic()
-        truth, measurements = self.plant.observe()
-        for name, measurement in measurements.items():  # first, since everybody waits for them
-            self._measurement[name].publish(to_message(measurement))
-        self._truth.publish(to_message(truth))
+        for name, measurement in self.plant.measure().items():  # first, since everybody waits for them
+            self._measurement[name](measurement)
+        self._truth(self.plant.truth())
         clock = Clock()
-        clock.clock.sec, clock.clock.nanosec = divmod(truth.time, NANOSECONDS)
+        clock.clock.sec, clock.clock.nanosec = divmod(self.plant.time, NANOSECONDS)
         self._tell_time.publish(clock)
 
     def _tell_event(self, time: int, tick: int, kind: str, detail: str) -> None:
-        self._events.publish(to_message(Event(time, tick, self.get_fully_qualified_name(), kind, detail)))
+        self._events(Event(time, tick, self.get_fully_qualified_name(), kind, detail))
 
     def _on_recorded(self, message: Clock) -> None:
         self._recorded = message.clock.sec * NANOSECONDS + message.clock.nanosec
@@ -157,7 +160,9 @@ class PlantNode(ConfiguredNode):
     def wait_for_recorder(self) -> bool:
         """Whether a recorder is there that has not got the last tick yet."""
         last = (self.plant.tick - 1) * self.values.tick_ns
-        return self.count_publishers(topics.RECORDED) > 0 and (self._recorded is None or self._recorded < last)
+        return self.count_publishers(topics.RECORDED) > 0 and (
+            self._recorded is None or self._recorded < last
+        )
 
     def _wait_for_pace(self) -> float:
         """Wall time (s) until the tick may end at the real-time factor."""

@@ -10,7 +10,6 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-
 from rcl_interfaces.msg import ParameterType
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
@@ -74,7 +73,9 @@ class RecorderNode(ConfiguredNode):
     def close(self) -> None:
         """Write what is known only at the end, and finish the bag."""
         for node, values in sorted(self._settings.items()):
-            self.bag.add_metadata(f"parameters {node}", {name: json.dumps(value) for name, value in values.items()})
+            self.bag.add_metadata(
+                f"parameters {node}", {name: json.dumps(value) for name, value in values.items()}
+            )
         self.bag.close()
 
     def _look(self) -> None:

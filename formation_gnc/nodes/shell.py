@@ -13,8 +13,8 @@ import rclpy
 import yaml
 from formation_gnc_msgs.msg import Timing
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
-from rclpy.duration import Duration
 from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, RMWError, UnknownROSArgsError
+from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -85,6 +85,12 @@ class ConfiguredNode(Node):  # type: ignore[misc]
             if leaf.name in given:
                 self.undeclare_parameter(leaf.name)
             self.declare_parameter(leaf.name, plain, _descriptor(leaf), ignore_override=True)
+
+    def speak(self, record: type, topic: str) -> Callable[[Any], None]:
+        """A function that publishes a record on a topic."""
+        publisher = self.create_publisher(message_type(record), topic, topics.quality())
+        message = message_type(record)()
+        return lambda each: publisher.publish(to_message(each, message))
 
     def spin(
         self,
@@ -173,15 +179,12 @@ class PartNode[P: Part[Any, Any]](ConfiguredNode):
 
             self.create_subscription(message_type(record), topic, receive, topics.quality(topics.LATEST))
 
-    def speak(self, record: type, topic: str) -> Callable[[Any], None]:
-        """A function that publishes a record on a topic."""
-        publisher = self.create_publisher(message_type(record), topic, topics.quality())
-        return lambda each: publisher.publish(to_message(each))
-
     def _finish_tick(self, header: Any, started: float) -> None:
         """Publish what nobody waits for: the events, and the wall time that the answer took."""
         self._timing.publish(
-            Timing(header=Header(stamp=header.stamp), node=self.get_name(), compute_time=perf_counter() - started)
+            Timing(
+                header=Header(stamp=header.stamp), node=self.get_name(), compute_time=perf_counter() - started
+            )
         )
         for event in self.part.take_events():
             self.get_logger().info(f"tick {event.tick}: {event.kind}: {event.detail}")

@@ -9,10 +9,9 @@ import numpy as np
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.interface import NANOSECONDS, Event, Measurement, SatelliteTruth, Truth, Vector
 from formation_gnc.mission import LAST_SECOND, Mission
-from formation_gnc.orbit.constants import EARTH_RADIUS
 from formation_gnc.orbit.elements import Elements, elements_from_state, state_from_elements
-from formation_gnc.orbit.frames import hill_rotation, inertial_from_relative, relative_from_inertial
 from formation_gnc.orbit.forces import Body, Forces
+from formation_gnc.orbit.frames import hill_rotation, inertial_from_relative, relative_from_inertial
 from formation_gnc.orbit.propagation import Propagator
 from formation_gnc.parameters import parameter, per_name
 from formation_gnc.plant.sensors import Sensors, SensorSuite
@@ -25,7 +24,11 @@ class DeputyParameters(Body):
     """One deputy: where it starts, what the forces act on, how it pushes and what it sees."""
 
     relative_state: tuple[float, ...] = parameter(
-        unit="m, m/s", length=6, doc="true state at the start relative to the chief, Hill frame"
+        unit="m, m/s",
+        length=6,
+        minimum=-1e9,
+        maximum=1e9,
+        doc="true state at the start relative to the chief, Hill frame",
     )
     thrusters: ThrusterParameters = ThrusterParameters()
     sensors: SensorSuite = SensorSuite()
@@ -49,7 +52,9 @@ class PlantParameters(Mission):
         doc="wall time a deputy has for its answer before it gets no thrust for the tick",
     )
     epoch: float = parameter(
-        0.0, unit="s", doc="Terrestrial Time at the start of the run since J2000.0; it places Sun, Moon and Greenwich"
+        0.0,
+        unit="s",
+        doc="Terrestrial Time at the start of the run since J2000.0; it places Sun, Moon and Greenwich",
     )
     step: float = parameter(
         10.0, unit="s", above=0.0, doc="longest integration step, of order eight; a longer tick is divided"
@@ -84,6 +89,10 @@ class PlantParameters(Mission):
         return -(-round(self.duration * NANOSECONDS) // self.tick_ns)
 
 
+NO_FIX = np.zeros(6)
+NO_FIX.setflags(write=False)
+
+
 @dataclass
 class _Satellite:
     """A deputy in flight, besides its inertial state."""
@@ -102,7 +111,7 @@ class _Satellite:
 class Plant:
     """Truth of chief and deputies in the inertial frame, under the forces in `parameters`.
 
-    Use: at every tick `observe`, then `step` with the deputies' forces. Thrust acts along the Hill axes at
+    Use: at every tick `measure`, then `step` with the deputies' forces. Thrust acts along the Hill axes at
     the tick's start, fixed in inertial space over the tick.
     """
 
@@ -126,9 +135,9 @@ class Plant:
 
     def _satellite(self, name: str, deputy: DeputyParameters) -> _Satellite:
         parameters = self.parameters
+        sensors = Sensors(deputy.sensors, parameters.tick_ns, parameters.seed, name)
+        random = generator(parameters.seed, f"{name}/thrusters")
         try:
-            sensors = Sensors(deputy.sensors, parameters.tick_ns, parameters.seed, name)
-            random = generator(parameters.seed, f"{name}/thrusters")
             thruster = Thruster(deputy.thrusters, parameters.tick, random)
             return _Satellite(name, sensors, thruster, thruster.start(deputy.mass), np.zeros(3))
         except ConfigurationError as error:
@@ -144,18 +153,12 @@ class Plant:
         """Whether all ticks have been flown."""
         return self.tick >= self.parameters.ticks
 
-    def observe(self) -> tuple[Truth, dict[str, Measurement]]:
-        """The truth at the current tick, and what each deputy measures of it; once per tick."""
-        chief = self._states[0]
-        truth = Truth(self.time, chief, [])
+    def measure(self) -> dict[str, Measurement]:
+        """What each deputy measures of the truth at the current tick; once per tick, before `step`."""
+        chief, seconds = self._states[0], self.time / NANOSECONDS
         measurements = {}
         for satellite, state in zip(self._satellites, self._states[1:], strict=True):
-            relative = relative_from_inertial(chief, state)
-            satellite.eclipse = self._propagator.illumination(self.time / NANOSECONDS, state) < 1.0
-            mass = satellite.state.mass
-            truth.deputies.append(
-                SatelliteTruth(satellite.name, state, relative, satellite.force, mass, satellite.eclipse)
-            )
+            satellite.eclipse = self._propagator.illumination(seconds, state) < 1.0
             sensors, readings, ages = satellite.sensors.readings(self.tick, state, chief)
             measurements[satellite.name] = Measurement(
                 time=self.time,
@@ -164,16 +167,34 @@ class Plant:
                 reading=readings,
                 age=ages,
                 applied_force=satellite.force,
-                mass=mass,
+                mass=satellite.state.mass,
                 eclipse=satellite.eclipse,
                 fix_available=satellite.missed,
-                fix=satellite.sensors.fix(relative) if satellite.missed else np.zeros(6),
+                fix=satellite.sensors.fix(relative_from_inertial(chief, state))
+                if satellite.missed
+                else NO_FIX,
                 deputy=satellite.name,
             )
-        return truth, measurements
+        return measurements
+
+    def truth(self) -> Truth:
+        """The truth at the current tick; after `measure`."""
+        chief = self._states[0]
+        deputies = [
+            SatelliteTruth(
+                satellite.name,
+                state,
+                relative_from_inertial(chief, state),
+                satellite.force,
+                satellite.state.mass,
+                satellite.eclipse,
+            )
+            for satellite, state in zip(self._satellites, self._states[1:], strict=True)
+        ]
+        return Truth(self.time, chief, deputies)
 
     def step(self, forces: Mapping[str, Vector]) -> list[str]:
-        """Fly one tick under the deputies' forces (3,), Hill frame, N; after `observe`.
+        """Fly one tick under the deputies' forces (3,), Hill frame, N; after `measure`.
 
         A deputy without an entry, or with a force that is not finite, missed the tick: it gets no thrust, and
         a fix with its next measurement, since it may have lost its state.
@@ -187,7 +208,9 @@ class Plant:
         rotation = hill_rotation(self._states[0])
         accelerations = np.zeros_like(self._states[:, :3])
         masses = np.array([self.parameters.chief_body.mass, *(each.state.mass for each in self._satellites)])
-        for satellite, acceleration, mass in zip(self._satellites, accelerations[1:], masses[1:], strict=True):
+        for satellite, acceleration, mass in zip(
+            self._satellites, accelerations[1:], masses[1:], strict=True
+        ):
             force = forces.get(satellite.name)
             satellite.missed = force is None or not np.isfinite(force).all()
             satellite.force, satellite.state, denied = satellite.thruster.apply(

@@ -62,8 +62,8 @@ class Run:
 
     def tick(self, sink: Sink) -> None:
         """Fly one tick and hand every record to `sink`."""
-        truth, measurements = self.plant.observe()
-        sink("/truth", truth)
+        measurements = self.plant.measure()
+        sink("/truth", self.plant.truth())
         forces: dict[str, Vector] = {}
         for satellite in self.satellites:
             measurement = measurements[satellite.name]
