@@ -1,7 +1,8 @@
 """The floor of the lock-step graph: four processes that pass the same messages on and do nothing else.
 
 Same message types and sizes, same topics, quality of service and executor as the graph; each answers with a
-message made beforehand and only stamped. Run as ``python -m bench.floor ROLE TICKS``; the plant prints its ticks per second.
+message made beforehand and only stamped. Run as ``python -m bench.floor ROLE TICKS``; the plant prints its
+ticks per second.
 """
 
 import sys

@@ -137,7 +137,8 @@ def leaves(
         kind, name = hints[field.name], prefix + field.name
         if "names" in field.metadata:
             source = field.metadata["names"]
-            listed = values.get(prefix + source, schema.__dataclass_fields__[source].default)
+            default = {each.name: each.default for each in dataclasses.fields(schema)}[source]
+            listed = values.get(prefix + source, default)
             for key in listed if _is_list(listed) else ():
                 yield from leaves(get_args(kind)[1], values, f"{prefix}{key}.")
             continue
@@ -181,7 +182,7 @@ def _build[T](schema: type[T], checked: Mapping[str, Any], prefix: str) -> T:
             keys = fields[field.metadata["names"]]
             fields[field.name] = {key: _build(get_args(kind)[1], checked, f"{prefix}{key}.") for key in keys}
         elif dataclasses.is_dataclass(kind):
-            fields[field.name] = _build(kind, checked, f"{name}.")
+            fields[field.name] = _build(kind, checked, f"{name}.")  # type: ignore[arg-type]
         else:
             fields[field.name] = checked[name]
     return schema(**fields)

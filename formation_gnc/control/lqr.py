@@ -140,7 +140,8 @@ class LinearQuadraticRegulator(Controller):
     def _design(self, parameters: LqrParameters, model: RelativeModel, weights: Weights) -> None:
         """Set `gain` (3, n), or the table `gains` (N, 3, n) at intervals of `interval` s."""
         tick = self.tick
-        self.gains = np.empty((0, 3, 6))
+        self.gain: Matrix
+        self.gains: Matrix = np.empty((0, 3, 6))
         self.interval = tick
         self._finite = parameters.gain == "finite"
         if not model.is_time_invariant:
@@ -193,7 +194,7 @@ class LinearQuadraticRegulator(Controller):
             return self.gain
         if self._finite:
             step = (time - (time if self._start is None else self._start)) // round(self.tick * NANOSECONDS)
-            return self.gains[step] if step < len(self.gains) else self.gain
+            return np.asarray(self.gains[step]) if step < len(self.gains) else self.gain
         place = time / NANOSECONDS / self.interval - 0.5
         index = int(np.floor(place))
         share, size = place - index, len(self.gains)

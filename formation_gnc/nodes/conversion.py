@@ -3,7 +3,6 @@
 import array
 import dataclasses
 from collections.abc import Callable
-from functools import cache
 from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -11,6 +10,8 @@ from formation_gnc_msgs import msg as messages
 
 from formation_gnc import interface
 from formation_gnc.interface import NANOSECONDS
+
+_FIELDS: dict[type[Any], "tuple[_Field, ...]"] = {}
 
 FRAME_IDS = {
     interface.Measurement: "inertial",
@@ -31,14 +32,13 @@ class _Field:
     decode: Callable[[Any], Any] | None
 
 
-@cache
-def message_type(record_type: type) -> Any:
+def message_type(record_type: type[Any]) -> Any:
     """The message class of the same name."""
     return getattr(messages, record_type.__name__)
 
 
 def to_message(record: Any, message: Any = None) -> Any:
-    """A ROS message with the contents of a record, its header included; an old `message` may be used again."""
+    """A ROS message with the contents of a record, header included; an old `message` may be used again."""
     kind = type(record)
     message = message or message_type(kind)()
     for field in _fields(kind):
@@ -70,8 +70,13 @@ def stamp(message: Any) -> int:
     return int(time.sec * NANOSECONDS + time.nanosec)
 
 
-@cache
-def _fields(record_type: type) -> tuple[_Field, ...]:
+def _fields(record_type: type[Any]) -> tuple[_Field, ...]:
+    if record_type not in _FIELDS:
+        _FIELDS[record_type] = _analyse(record_type)
+    return _FIELDS[record_type]
+
+
+def _analyse(record_type: type[Any]) -> tuple[_Field, ...]:
     hints = get_type_hints(record_type)
     return tuple(
         _field(field, hints[field.name]) for field in dataclasses.fields(record_type) if field.name != "time"

@@ -32,8 +32,9 @@ REPORT_PERIOD = 0.5
 class PlantNode(ConfiguredNode):
     """Publishes a tick, gathers the thrust of its stamp, steps, and so on to the end of the run.
 
-    The run starts when every deputy's nodes are there, and then a deputy has `deadline` seconds of wall time for each answer, from its
-    first one on: after that it gets no thrust for the tick. The plant never runs further ahead of a recorder than queues hold.
+    The run starts when every deputy's nodes are there, and then a deputy has `deadline` seconds of wall time
+    for each answer, from its first one on: after that it gets no thrust for the tick. The plant never runs
+    further ahead of a recorder than queues hold.
     """
 
     def __init__(self) -> None:
@@ -169,7 +170,7 @@ class PlantNode(ConfiguredNode):
         if self.values.real_time_factor == 0.0:
             return 0.0
         due = self._started + (self.plant.tick + 1) * self.values.tick / self.values.real_time_factor
-        return due - monotonic()
+        return float(due - monotonic())
 
     @property
     def period(self) -> float:

@@ -56,12 +56,12 @@ STOP = Future()
 class ConfiguredNode(Node):  # type: ignore[misc]
     """A node whose parameters come from a schema.
 
-    `values` is the schema's instance. An override that the schema does not know or allow raises ConfigurationError, as does a
-    later change of it, with the same words, through the parameter service.
+    `values` is the schema's instance. An override that the schema does not know or allow raises
+    ConfigurationError, as does a later change of it, with the same words, through the parameter service.
     """
 
     def __init__(self, name: str, schema: type, namespace: str = "") -> None:
-        """Declare the schema's parameters with the values given on the command line and in parameter files."""
+        """Declare the schema's parameters, with the values of the command line and of parameter files."""
         self._executor: Any = None
         try:
             super().__init__(
@@ -100,7 +100,8 @@ class ConfiguredNode(Node):  # type: ignore[misc]
     ) -> None:
         """Work until any of the futures is done; `check` is called every `period` (s) or sooner.
 
-        One executor serves the node for all its life: a message that one has noticed but not handled is lost to the next.
+        One executor serves the node for all its life: a message that one has noticed but not handled is lost
+        to the next.
         """
         if self._executor is None:
             self._executor = Executor()
@@ -122,7 +123,8 @@ class ConfiguredNode(Node):  # type: ignore[misc]
 def _from_command_line(arguments: Sequence[str]) -> Iterator[Parameter]:
     """Parameters given with ``-p name:=value``.
 
-    rclpy knows them too, but there a parameter file's section for the node goes before them, whatever the order: who types one means it.
+    rclpy knows them too, but there a parameter file's section for the node goes before them, whatever the
+    order: who types one means it.
     """
     for flag, rule in pairwise(arguments):
         name, separator, value = rule.partition(":=")
@@ -145,8 +147,9 @@ def _descriptor(leaf: Leaf) -> ParameterDescriptor:
 class PartNode[P: Part[Any, Any]](ConfiguredNode):
     """Shell of a part of one deputy: messages to records, one call, records to messages.
 
-    A change of parameters through the standard services is checked and designed in a thread of its own, so that no answer waits
-    for it, and takes over at the next tick; it is answered when that is settled, with the reason if it is refused.
+    A change of parameters through the standard services is checked and designed in a thread of its own, so
+    that no answer waits for it, and takes over at the next tick; it is answered when that is settled, with
+    the reason if it is refused.
     """
 
     def __init__(self, name: str, schema: type, part: Callable[[str, Any], P]) -> None:
@@ -163,7 +166,8 @@ class PartNode[P: Part[Any, Any]](ConfiguredNode):
                 _answer_from(self._designer, service)
 
     def answer(self, respond: Callable[..., None], inputs: Mapping[str, type]) -> None:
-        """Call `respond` with one record of every input topic as soon as all of one stamp are there, once per stamp."""
+        """Call `respond` with one record of every input topic as soon as all of one stamp are there, once per
+        stamp."""
         latest: dict[str, Any] = {}
         for topic, record in inputs.items():
 
@@ -217,10 +221,12 @@ def _answer_from(pool: ThreadPoolExecutor, service: Service) -> None:
 def run(make_node: Callable[[], ConfiguredNode], fly: Callable[[Any], None] = ConfiguredNode.spin) -> int:
     """Body of every executable: make the node, let it fly, and end with the exit status.
 
-    Signals only set `STOP`, since a node that has been asked to stop still has to hand over what it published or recorded.
+    Signals only set `STOP`, since a node that has been asked to stop still has to hand over what it published
+    or recorded.
 
     Returns:
-        0 after an ordinary end or an interruption, 1 when a satellite came down, 2 when something given to the node is not allowed.
+        0 after an ordinary end or an interruption, 1 when a satellite came down, 2 when something given to
+        the node is not allowed.
     """
     node = None
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -236,11 +236,13 @@ class Plant:
 
 
 def _start(chief: Vector, name: str, deputy: DeputyParameters) -> Vector:
-    """Inertial state (6,) of a deputy at the start; raises ConfigurationError for an orbit that cannot be flown."""
+    """Inertial state (6,) of a deputy at the start; raises ConfigurationError for an orbit that cannot be
+    flown."""
     relative = np.array(deputy.relative_state)
     if not relative[:3].any():
         raise ConfigurationError(
-            f"parameter {name}.relative_state: {relative.tolist()} is not allowed; its position must be off the chief's"
+            f"parameter {name}.relative_state: {relative.tolist()} is not allowed; "
+            "its position must be off the chief's"
         )
     state = inertial_from_relative(chief, relative)
     try:

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import domain_coordinator
@@ -110,7 +111,10 @@ class Sil:
     def children(self) -> dict[str, int]:
         """Process numbers of the nodes by executable name."""
         listed = subprocess.run(
-            ["ps", "-ww", "--ppid", str(self.process.pid), "-o", "pid=,args="], capture_output=True, text=True, check=False
+            ["ps", "-ww", "--ppid", str(self.process.pid), "-o", "pid=,args="],
+            capture_output=True,
+            text=True,
+            check=False,
         ).stdout
         found = {}
         for line in listed.splitlines():
@@ -125,7 +129,10 @@ class Sil:
 
     def wait_for_flight(self) -> None:
         """Until messages of the flight are on disk: far more than the topics' definitions alone."""
-        wait_until(lambda: self.recorded_bytes() > 100_000 or self.process.poll() is not None, "the flight to be recorded")
+        wait_until(
+            lambda: self.recorded_bytes() > 100_000 or self.process.poll() is not None,
+            "the flight to be recorded",
+        )
         assert self.process.poll() is None, self.process.stderr.read() if self.process.stderr else ""
 
     def finish(self, patience: float = PATIENCE) -> tuple[int, str, str]:
@@ -145,8 +152,6 @@ def sil(tmp_path: Path) -> Iterator[Callable[..., Sil]]:
     yield start
     for each in started:
         for pid in [*each.children().values(), each.process.pid]:
-            try:
+            with suppress(ProcessLookupError):
                 os.killpg(pid, signal.SIGKILL)
-            except ProcessLookupError:
-                pass
         each.process.communicate()

@@ -103,7 +103,8 @@ def test_nodes_started_by_hand_in_any_order_fly_and_swap_the_law_in_flight(desk:
 
 def test_the_plant_waits_and_says_for_whom(desk: Desk) -> None:
     plant = desk.start("plant", duration=10.0)
-    wait_until(lambda: "waiting for /deputy1/navigation, /deputy1/guidance, /deputy1/controller" in plant.text, "a word")
+    everyone = ", ".join(f"/deputy1/{part}" for part in PARTS)
+    wait_until(lambda: f"waiting for {everyone}" in plant.text, "a word")
     for kind in PARTS:
         desk.start(kind)
     assert plant.wait() == 0, "the recorder can be left out"
@@ -164,7 +165,8 @@ def test_graph_and_in_process_runner_agree_bit_for_bit(sil: StartSil, tmp_path: 
 
 
 def test_two_runs_at_once_do_not_hear_each_other(sil: StartSil, tmp_path: Path) -> None:
-    runs = [sil("--json", "--duration", "300", "--seed", seed, directory=tmp_path / seed) for seed in ("1", "2")]
+    options = ("--json", "--duration", "300")
+    runs = [sil(*options, "--seed", seed, directory=tmp_path / seed) for seed in ("1", "2")]
     summaries = []
     for run in runs:
         status, output, errors = run.finish(2 * PATIENCE)
@@ -216,7 +218,8 @@ def test_the_nodes_end_when_the_command_is_killed(sil: StartSil) -> None:
     run.wait_for_flight()
     children = run.children()
     os.kill(run.process.pid, signal.SIGKILL)
-    wait_until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in children.values()), "all nodes to end", 10.0)
+    processes = [Path(f"/proc/{pid}") for pid in children.values()]
+    wait_until(lambda: not any(process.exists() for process in processes), "all nodes to end", 10.0)
     assert Bag(run.bag).damage is None
 
 
@@ -225,9 +228,9 @@ def test_the_nodes_end_when_the_command_is_killed(sil: StartSil) -> None:
     [
         ("plant", {"deadlin": 1.0}, "parameter deadlin: unknown; did you mean deadline?"),
         ("plant", {"tick": -1.0}, "parameter tick: -1.0 is not allowed; it must be above 0"),
-        ("controller", {"algorithm": "magic"}, "parameter algorithm: 'magic' is not allowed; it must be one of coast"),
-        ("navigation", {"latitude_sigma": ".nan"}, "parameter latitude_sigma: nan is not allowed; it must be finite"),
-        ("guidance", {"formation": 3}, "parameter formation: 3 is not allowed; it must be a value of type string"),
+        ("controller", {"algorithm": "magic"}, "algorithm: 'magic' is not allowed; it must be one of coast"),
+        ("navigation", {"latitude_sigma": ".nan"}, "latitude_sigma: nan is not allowed; it must be finite"),
+        ("guidance", {"formation": 3}, "formation: 3 is not allowed; it must be a value of type string"),
         ("recorder", {"bag": "/proc"}, "/proc"),
     ],
 )
@@ -236,7 +239,10 @@ def test_a_node_refuses_a_wrong_parameter_in_one_line_with_status_2(
 ) -> None:
     terminal = desk.start(kind, **parameter)
     assert terminal.wait() == 2
-    (line,) = [line for line in terminal.text.splitlines() if line.strip()]
+    # `ros2 run` adds a line of its own
+    (line,) = [
+        line for line in terminal.text.splitlines() if line.strip() and not line.startswith("[ros2run]")
+    ]
     assert line.startswith(f"{kind}: ")
     assert said in line
 
