@@ -1,7 +1,8 @@
 """The floor of the lock-step graph: four processes that pass the same messages on and do nothing else.
 
 Same message types and sizes, same topics, quality of service and executor as the graph; each answers with a
-message made beforehand and only stamped. Run as ``python -m bench.floor ROLE TICKS``; the plant prints its ticks per second.
+message made beforehand and only stamped. Run as ``python -m bench.floor ROLE TICKS``; the plant prints its
+ticks per second.
 """
 
 import sys
@@ -33,7 +34,11 @@ OUTPUTS = {
         (messages.Status, topics.STATUS),
         (messages.Timing, topics.TIMING),
     ],
-    "plant": [(messages.Measurement, topics.MEASUREMENT), (messages.Truth, topics.TRUTH), (Clock, topics.CLOCK)],
+    "plant": [
+        (messages.Measurement, topics.MEASUREMENT),
+        (messages.Truth, topics.TRUTH),
+        (Clock, topics.CLOCK),
+    ],
 }
 
 
@@ -55,7 +60,10 @@ class Relay(Node):  # type: ignore[misc]
         self.stamps: dict[str, int] = {}
         for kind, topic in INPUTS[role]:
             self.create_subscription(
-                kind, topic, lambda message, topic=topic: self.receive(topic, message), topics.quality(topics.LATEST)
+                kind,
+                topic,
+                lambda message, topic=topic: self.receive(topic, message),
+                topics.quality(topics.LATEST),
             )
 
     def receive(self, topic: str, message: Any) -> None:

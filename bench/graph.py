@@ -63,12 +63,26 @@ def in_process(record: bool) -> float:
 def run() -> list[Result]:
     """All figures of the graph."""
     bare, flown, recorded, process, process_recorded = interleaved(
-        [floor, lambda: graph(False), lambda: graph(True), lambda: in_process(False), lambda: in_process(True)], ROUNDS
+        [
+            floor,
+            lambda: graph(False),
+            lambda: graph(True),
+            lambda: in_process(False),
+            lambda: in_process(True),
+        ],
+        ROUNDS,
     )
     return [
         Result("graph against a do-nothing floor", flown, bare, "ticks/s", flown / bare, ">= 0.7"),
         Result("in-process against real time, 1 s tick", process, 1.0, "ticks/s", process, ">= 5000"),
         Result("graph with recorder against without", recorded, flown, "ticks/s", recorded / flown, ""),
-        Result("in-process with recording against without", process_recorded, process, "ticks/s", process_recorded / process, ""),
+        Result(
+            "in-process with recording against without",
+            process_recorded,
+            process,
+            "ticks/s",
+            process_recorded / process,
+            "",
+        ),
         Result("in-process against graph", process, flown, "ticks/s", process / flown, ""),
     ]

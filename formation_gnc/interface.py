@@ -37,7 +37,7 @@ class EstimateStatus(IntEnum):
 
 
 class Refusal(IntEnum):
-    """Why something of a measurement was not used; the places in `Estimate.refusals`, constants of Estimate.msg."""
+    """Why something of a measurement was not used: places in `Estimate.refusals`, its constants."""
 
     NOT_FINITE = 0
     GATE = 1

@@ -133,11 +133,12 @@ def leaves(
     the schema's own defaults, so that two nested schemas of one kind may have different ones.
     """
     hints = get_type_hints(schema)
-    for field in dataclasses.fields(schema):
+    fields = {field.name: field for field in dataclasses.fields(schema)}
+    for field in fields.values():
         kind, name = hints[field.name], prefix + field.name
         if "names" in field.metadata:
             source = field.metadata["names"]
-            listed = values.get(prefix + source, schema.__dataclass_fields__[source].default)
+            listed = values.get(prefix + source, fields[source].default)
             for key in listed if _is_list(listed) else ():
                 yield from leaves(get_args(kind)[1], values, f"{prefix}{key}.")
             continue
@@ -181,7 +182,7 @@ def _build[T](schema: type[T], checked: Mapping[str, Any], prefix: str) -> T:
             keys = fields[field.metadata["names"]]
             fields[field.name] = {key: _build(get_args(kind)[1], checked, f"{prefix}{key}.") for key in keys}
         elif dataclasses.is_dataclass(kind):
-            fields[field.name] = _build(kind, checked, f"{name}.")
+            fields[field.name] = _build(kind, checked, f"{name}.")  # type: ignore[arg-type]
         else:
             fields[field.name] = checked[name]
     return schema(**fields)

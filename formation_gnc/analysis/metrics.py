@@ -26,7 +26,7 @@ class Trajectory:
     nis: Vector
     """(N,) normalised innovation squared; 0 on ticks without readings."""
     applied: Matrix
-    """(M, 3) accelerations the thrusters gave over each tick, Hill frame, m/s^2; on all ticks of the truth."""
+    """(M, 3) accelerations by thrust over each tick, Hill frame, m/s^2; on all ticks of the truth."""
     applied_time: Vector
     """(M,) time at which each of those ticks began, s."""
     tick: float
@@ -90,9 +90,7 @@ def trajectory(bag: Bag, deputy: str) -> Trajectory:
     if missing:
         raise ConfigurationError(f"{bag.path}: has no {' and no '.join(missing)} of {deputy}")
     estimate, target = bag.arrays(f"/{deputy}/estimate"), bag.arrays(f"/{deputy}/target")
-    stamps = np.intersect1d(
-        np.intersect1d(truth["stamp_ns"], estimate["stamp_ns"]), target["stamp_ns"]
-    )
+    stamps = np.intersect1d(np.intersect1d(truth["stamp_ns"], estimate["stamp_ns"]), target["stamp_ns"])
     if not len(stamps):
         raise ConfigurationError(f"{bag.path}: {deputy} never answered")
     rows = {id(part): np.searchsorted(part["stamp_ns"], stamps) for part in (truth, estimate, target)}

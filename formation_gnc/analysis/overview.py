@@ -17,7 +17,7 @@ POINTS = 4000
 
 
 def draw_overview(bag: Bag, path: Path, title: str) -> Path:
-    """Draw every deputy of a run, a row each: relative path, control error, estimation error with 3 sigma, thrust.
+    """Draw a row for every deputy: relative path, control error, estimation error with 3 sigma, thrust.
 
     Returns:
         The path of the PNG file.
@@ -46,7 +46,9 @@ def _draw_path(axes: Any, flown: Trajectory, name: str) -> None:
     axes.plot(flown.target[thin, 1], flown.target[thin, 0], color="tab:red", lw=1.0, ls="--", label="target")
     axes.plot(*flown.truth[0, [1, 0]], "o", color="tab:blue", ms=5, label="start")
     axes.plot(*flown.target[-1, [1, 0]], "*", color="tab:red", ms=12, label="target at the end")
-    axes.set(xlabel="along-track y [m]", ylabel="radial x [m]", title=f"{name}: path in the chief's Hill frame")
+    axes.set(
+        xlabel="along-track y [m]", ylabel="radial x [m]", title=f"{name}: path in the chief's Hill frame"
+    )
     axes.axis("equal")
     axes.invert_xaxis()
     axes.legend(loc="best", fontsize="small")
@@ -69,7 +71,11 @@ def _draw_estimation(axes: Any, flown: Trajectory) -> None:
         axes.plot(hours[thin], flown.estimation_error[thin, axis], color=colour, lw=1.0, label=label)
         for sign in (-3.0, 3.0):
             axes.plot(hours[thin], sign * flown.sigma[thin, axis], color=colour, lw=0.8, ls=":")
-    axes.set(xlabel="time [h]", ylabel="estimate - truth [m]", title="estimation error, dotted: 3 sigma of the filter")
+    axes.set(
+        xlabel="time [h]",
+        ylabel="estimate - truth [m]",
+        title="estimation error, dotted: 3 sigma of the filter",
+    )
     axes.legend(loc="best", fontsize="small")
     axes.grid(alpha=0.3)
 
@@ -78,7 +84,9 @@ def _draw_thrust(axes: Any, flown: Trajectory) -> None:
     thin, hours = _thin(len(flown.applied_time)), flown.applied_time / 3600.0
     for axis, (label, colour) in enumerate(zip(AXES, COLOURS, strict=True)):
         axes.plot(hours[thin], 1e6 * flown.applied[thin, axis], color=colour, lw=0.9, label=label)
-    axes.set(xlabel="time [h]", ylabel="acceleration by thrust [um/s^2]", title="thrust and delta-v (grey, right)")
+    axes.set(
+        xlabel="time [h]", ylabel="acceleration by thrust [um/s^2]", title="thrust and delta-v (grey, right)"
+    )
     spent = axes.twinx()
     total = np.cumsum(np.abs(flown.applied).sum(axis=1)) * flown.tick
     spent.plot(hours[thin], 1e3 * total[thin], color="grey", lw=1.5)

@@ -10,8 +10,9 @@ from formation_gnc.mission import Mission
 class Formation(ABC):
     """A relative orbit for one deputy to follow.
 
-    A subclass's docstring says where the deputy is to be and where that comes from; its `Parameters` are a frozen dataclass of
-    :func:`formation_gnc.parameters.parameter` fields, and become the guidance node's parameters under the formation's name.
+    A subclass's docstring says where the deputy is to be and where that comes from; its `Parameters` are a
+    frozen dataclass of :func:`formation_gnc.parameters.parameter` fields, and become the guidance node's
+    parameters under the formation's name.
     """
 
     Parameters: ClassVar[type]

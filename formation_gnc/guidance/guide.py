@@ -16,7 +16,9 @@ from formation_gnc.part import Part, Schedulable
 class GuideParameters(Schedulable):
     """What holds for every formation."""
 
-    formation: str = parameter("leader_follower", choices=tuple(FORMATIONS), in_flight=True, doc="formation in force")
+    formation: str = parameter(
+        "leader_follower", choices=tuple(FORMATIONS), in_flight=True, doc="formation in force"
+    )
     preview_steps: int = parameter(0, minimum=0, maximum=10_000, doc="target states given ahead of time")
     preview_step: float = parameter(60.0, unit="s", above=0.0, doc="time between target states given ahead")
 
@@ -27,7 +29,9 @@ GuidanceParameters: Any = make_dataclass(
     bases=(GuideParameters,),
     frozen=True,
     kw_only=True,
-    namespace={"__doc__": "Parameters of the guidance node: what holds for every formation, and each one's own."},
+    namespace={
+        "__doc__": "Parameters of the guidance node: what holds for every formation, and each one's own."
+    },
 )
 
 

@@ -22,7 +22,8 @@ class LeaderFollowerParameters:
 class LeaderFollower(Formation):
     """At rest behind the chief on its track: [0, -separation, 0, 0, 0, 0].
 
-    An equilibrium of Hill's equations, so it needs no thrust about a circular chief (Roberts, leader-follower of MUSTANG).
+    An equilibrium of Hill's equations, so it needs no thrust about a circular chief (Roberts,
+    leader-follower of MUSTANG).
     """
 
     Parameters = LeaderFollowerParameters

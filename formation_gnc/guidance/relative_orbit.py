@@ -14,19 +14,27 @@ from formation_gnc.parameters import parameter
 class RelativeOrbitParameters:
     """The six constants of a relative orbit, named as in the source."""
 
-    rho: float = parameter(1000.0, unit="m", minimum=0.0, in_flight=True, doc="radial amplitude; twice that along-track")
+    rho: float = parameter(
+        1000.0, unit="m", minimum=0.0, in_flight=True, doc="radial amplitude; twice that along-track"
+    )
     theta: float = parameter(0.0, unit="rad", in_flight=True, doc="phase at the start of the run")
-    a: float = parameter(0.0, unit="m", in_flight=True, doc="radial offset; makes the orbit drift along-track")
+    a: float = parameter(
+        0.0, unit="m", in_flight=True, doc="radial offset; makes the orbit drift along-track"
+    )
     b: float = parameter(0.0, unit="m", in_flight=True, doc="along-track offset")
-    m: float = parameter(0.0, in_flight=True, doc="slope of the cross-track motion in phase with the radial one")
-    n: float = parameter(0.0, in_flight=True, doc="slope of the cross-track motion in phase with the along-track one")
+    m: float = parameter(
+        0.0, in_flight=True, doc="slope of the cross-track motion in phase with the radial one"
+    )
+    n: float = parameter(
+        0.0, in_flight=True, doc="slope of the cross-track motion in phase with the along-track one"
+    )
 
 
 class RelativeOrbit(Formation):
     """General free solution of Hill's equations (Joshi 4.14-4.19, with the factor omega that 4.17 lacks).
 
-    Needs no thrust about a circular chief; for any other it is Joshi's desired trajectory, at the constant rate
-    sqrt(mu / a^3).
+    Needs no thrust about a circular chief; for any other it is Joshi's desired trajectory, at the constant
+    rate sqrt(mu / a^3).
     """
 
     Parameters = RelativeOrbitParameters

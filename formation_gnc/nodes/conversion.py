@@ -39,7 +39,7 @@ def message_type(record_type: type) -> Any:
 
 def to_message(record: Any) -> Any:
     """A ROS message with the contents of a record, its header included."""
-    kind = type(record)
+    kind: Any = type(record)
     message = message_type(kind)()
     for field in _fields(kind):
         value = getattr(record, field.name)
@@ -53,10 +53,11 @@ def to_message(record: Any) -> Any:
 
 def from_message[T](record_type: type[T], message: Any) -> T:
     """The record with the contents of a ROS message."""
-    values = {
-        field.name: field.decode(getattr(message, field.name)) if field.decode else getattr(message, field.name)
-        for field in _fields(record_type)
-    }
+    kind: Any = record_type
+    values: dict[str, Any] = {}
+    for field in _fields(kind):
+        value = getattr(message, field.name)
+        values[field.name] = field.decode(value) if field.decode else value
     if hasattr(message, "header"):
         values["time"] = stamp(message)
     return record_type(**values)
@@ -72,9 +73,7 @@ def stamp(message: Any) -> int:
 def _fields(record_type: type) -> tuple[_Field, ...]:
     hints = get_type_hints(record_type)
     return tuple(
-        _field(field, hints[field.name])
-        for field in dataclasses.fields(record_type)
-        if field.name != "time"
+        _field(field, hints[field.name]) for field in dataclasses.fields(record_type) if field.name != "time"
     )
 
 

@@ -58,7 +58,9 @@ def executable(node: str) -> Path:
         path = Path(prefix) / "lib" / "formation_gnc" / node
         if path.is_file():
             return path
-    raise ConfigurationError(f"node {node}: not installed; build with colcon, and source env.sh or install/setup.bash")
+    raise ConfigurationError(
+        f"node {node}: not installed; build with colcon, and source env.sh or install/setup.bash"
+    )
 
 
 class Graph:
@@ -99,7 +101,7 @@ class Graph:
                 raise NodeDied(f"{node.name} ended: {node.reason()}")
 
     def stop(self) -> None:
-        """Stop every node: the recorder last, so that it hears the others out, and by force what does not stop."""
+        """Stop every node, the recorder last, since it hears the others out; by force what does not stop."""
         for kind in (False, True):
             group = [node for node in self.nodes if node.name.endswith("/recorder") is kind]
             _signal(group, signal.SIGINT)
@@ -178,7 +180,10 @@ def fly_graph(
         last = report
         show(report)
 
-    with tempfile.TemporaryDirectory(prefix="formation_gnc-") as directory, domain_coordinator.domain_id() as domain:
+    with (
+        tempfile.TemporaryDirectory(prefix="formation_gnc-") as directory,
+        domain_coordinator.domain_id() as domain,
+    ):
         file = Path(directory) / f"{scenario.name}.yaml"
         recorder = {"/recorder": {"bag": str(bag), **_mission(scenario)}} if bag else {}
         scenario.write(file, {"/plant": {"wait_for_recorder": bag is not None}, **recorder})

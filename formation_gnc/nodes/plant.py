@@ -32,8 +32,9 @@ REPORT_PERIOD = 0.5
 class PlantNode(ConfiguredNode):
     """Publishes a tick, gathers the thrust of its stamp, steps, and so on to the end of the run.
 
-    The run starts when every deputy's nodes are there, and then a deputy has `deadline` seconds of wall time for each answer, from its
-    first one on: after that it gets no thrust for the tick. The plant never runs further ahead of a recorder than queues hold.
+    The run starts when every deputy's nodes are there, and then a deputy has `deadline` seconds of wall
+    time for each answer, from its first one on: after that it gets no thrust for the tick. The plant never
+    runs further ahead of a recorder than queues hold.
     """
 
     def __init__(self) -> None:
@@ -42,7 +43,8 @@ class PlantNode(ConfiguredNode):
         self.plant = Plant(self.values)
         self.done = Future()
         self._measurement = {
-            name: self._publisher(Measurement, f"/{name}/{topics.MEASUREMENT}") for name in self.values.deputies
+            name: self._publisher(Measurement, f"/{name}/{topics.MEASUREMENT}")
+            for name in self.values.deputies
         }
         self._truth = self._publisher(Truth, topics.TRUTH)
         self._events = self._publisher(Event, topics.EVENTS)
@@ -90,7 +92,12 @@ class PlantNode(ConfiguredNode):
             self._report("flying")
 
     def _advance_if_ready(self) -> None:
-        if not self._awaited and not self.done.done() and self._recorder_keeps_up() and self._wait_for_pace() <= 0.0:
+        if (
+            not self._awaited
+            and not self.done.done()
+            and self._recorder_keeps_up()
+            and self._wait_for_pace() <= 0.0
+        ):
             self._advance()
 
     def _on_thrust(self, name: str, message: Any) -> None:
@@ -121,7 +128,8 @@ class PlantNode(ConfiguredNode):
         if name in self._forces:
             return f"commanded {self._forces[name].tolist()} N"
         absent = [node for node in self._missing() if node.startswith(f"/{name}/")]
-        where = f" ({', '.join(absent)} not there)" if absent else ""  # a killed node is missed by DDS only later
+        # DDS notices only later that a node was killed.
+        where = f" ({', '.join(absent)} not there)" if absent else ""
         return f"did not answer within {self.values.deadline:g} s{where}"
 
     def _publish_tick(self) -> None:
@@ -152,14 +160,16 @@ class PlantNode(ConfiguredNode):
     def wait_for_recorder(self) -> bool:
         """Whether a recorder is there that has not got the last tick yet."""
         last = (self.plant.tick - 1) * self.values.tick_ns
-        return self.count_publishers(topics.RECORDED) > 0 and (self._recorded is None or self._recorded < last)
+        return self.count_publishers(topics.RECORDED) > 0 and (
+            self._recorded is None or self._recorded < last
+        )
 
     def _wait_for_pace(self) -> float:
         """Wall time (s) until the tick may end at the real-time factor."""
         if self.values.real_time_factor == 0.0:
             return 0.0
         due = self._started + (self.plant.tick + 1) * self.values.tick / self.values.real_time_factor
-        return due - monotonic()
+        return float(due - monotonic())
 
     @property
     def period(self) -> float:

@@ -25,7 +25,8 @@ class InProcessRecorder:
 
     def __call__(self, topic: str, record: Any) -> None:
         """Write one record; the clock follows each truth, as the plant publishes it."""
-        self._write(topic, to_message(record), message_type(type(record)), record.time)
+        kind: Any = type(record)
+        self._write(topic, to_message(record), message_type(kind), record.time)
         if isinstance(record, interface.Truth):
             clock = Clock()
             clock.clock.sec, clock.clock.nanosec = divmod(record.time, NANOSECONDS)

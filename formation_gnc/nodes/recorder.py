@@ -10,7 +10,6 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-
 from rcl_interfaces.msg import ParameterType
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
@@ -46,7 +45,8 @@ class RecorderParameters(Mission):
 class RecorderNode(ConfiguredNode):
     """Subscribes to every topic there is and writes what comes, as it came.
 
-    Messages are stamped with simulated time: their own header's for the project's messages, the latest tick's for others.
+    Messages are stamped with simulated time: their own header's for the project's messages, the latest
+    tick's for others.
     """
 
     def __init__(self) -> None:
@@ -74,7 +74,9 @@ class RecorderNode(ConfiguredNode):
     def close(self) -> None:
         """Write what is known only at the end, and finish the bag."""
         for node, values in sorted(self._settings.items()):
-            self.bag.add_metadata(f"parameters {node}", {name: json.dumps(value) for name, value in values.items()})
+            self.bag.add_metadata(
+                f"parameters {node}", {name: json.dumps(value) for name, value in values.items()}
+            )
         self.bag.close()
 
     def _look(self) -> None:
@@ -153,7 +155,7 @@ class RecorderNode(ConfiguredNode):
 
 
 def _first_stamp(data: bytes) -> int:
-    """The stamp that a message begins with, in ns: after four bytes that tell the encoding, seconds and nanoseconds."""
+    """The stamp that a message begins with, in ns: after four bytes that tell how it is encoded."""
     seconds, nanoseconds = struct.unpack_from("<iI", data, 4)
     return int(seconds * NANOSECONDS + nanoseconds)
 
@@ -163,7 +165,7 @@ def record(node: RecorderNode) -> None:
     quiet = Future()
     try:
         node.spin()
-        node.spin((quiet,), lambda: node.is_quiet() and quiet.set_result(None))
+        node.spin((quiet,), lambda: quiet.set_result(None) if node.is_quiet() else None)
     finally:
         node.close()
 

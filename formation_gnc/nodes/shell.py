@@ -10,11 +10,10 @@ from time import monotonic, perf_counter
 from typing import Any
 
 import rclpy
-import yaml
 from formation_gnc_msgs.msg import Timing
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
-from rclpy.duration import Duration
 from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, RMWError, UnknownROSArgsError
+from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -32,7 +31,7 @@ from formation_gnc.errors import ConfigurationError
 from formation_gnc.interface import Event
 from formation_gnc.nodes import topics
 from formation_gnc.nodes.conversion import from_message, message_type, to_message
-from formation_gnc.parameters import Leaf, dump, leaves, load
+from formation_gnc.parameters import Leaf, dump, leaves, load, read_yaml
 from formation_gnc.part import Part
 
 REFUSED_BY_ROS = (RCLInvalidROSArgsError, UnknownROSArgsError, RCLError, RMWError)
@@ -55,12 +54,12 @@ STOP = Future()
 class ConfiguredNode(Node):  # type: ignore[misc]
     """A node whose parameters come from a schema.
 
-    `values` is the schema's instance. An override that the schema does not know or allow raises ConfigurationError, as does a
-    later change of it, with the same words, through the parameter service.
+    `values` is the schema's instance. An override that the schema does not know or allow raises
+    ConfigurationError, as does a later change of it, with the same words, through the parameter service.
     """
 
     def __init__(self, name: str, schema: type, namespace: str = "") -> None:
-        """Declare the schema's parameters with the values given on the command line and in parameter files."""
+        """Declare the schema's parameters, with values from the command line and parameter files."""
         self._executor: Any = None
         try:
             super().__init__(
@@ -93,7 +92,8 @@ class ConfiguredNode(Node):  # type: ignore[misc]
     ) -> None:
         """Work until any of the futures is done; `check` is called every `period` (s) or sooner.
 
-        One executor serves the node for all its life: a message that one has noticed but not handled is lost to the next.
+        One executor serves the node for all its life: a message that one has noticed but not handled is
+        lost to the next.
         """
         if self._executor is None:
             self._executor = Executor()
@@ -115,12 +115,13 @@ class ConfiguredNode(Node):  # type: ignore[misc]
 def _from_command_line(arguments: Sequence[str]) -> Iterator[Parameter]:
     """Parameters given with ``-p name:=value``.
 
-    rclpy knows them too, but there a parameter file's section for the node goes before them, whatever the order: who types one means it.
+    rclpy knows them too, but there a parameter file's section for the node goes before them, whatever the
+    order: who types one means it.
     """
     for flag, rule in pairwise(arguments):
         name, separator, value = rule.partition(":=")
         if flag in ("-p", "--param") and separator and ":" not in name:
-            yield Parameter(name, value=yaml.safe_load(value))
+            yield Parameter(name, value=read_yaml(value))
 
 
 def _descriptor(leaf: Leaf) -> ParameterDescriptor:
@@ -138,8 +139,9 @@ def _descriptor(leaf: Leaf) -> ParameterDescriptor:
 class PartNode[P: Part[Any, Any]](ConfiguredNode):
     """Shell of a part of one deputy: messages to records, one call, records to messages.
 
-    A change of parameters through the standard services is checked and designed in a thread of its own, so that no answer waits
-    for it, and takes over at the next tick; it is answered when that is settled, with the reason if it is refused.
+    A change of parameters through the standard services is checked and designed in a thread of its own, so
+    that no answer waits for it, and takes over at the next tick; it is answered when that is settled, with
+    the reason if it is refused.
     """
 
     def __init__(self, name: str, schema: type, part: Callable[[str, Any], P]) -> None:
@@ -156,7 +158,7 @@ class PartNode[P: Part[Any, Any]](ConfiguredNode):
                 _answer_from(self._designer, service)
 
     def answer(self, respond: Callable[..., None], inputs: Mapping[str, type]) -> None:
-        """Call `respond` with one record of every input topic as soon as all of one stamp are there, once per stamp."""
+        """Call `respond` once per stamp, when one record of it is there from every input topic."""
         latest: dict[str, Any] = {}
         for topic, record in inputs.items():
 
@@ -180,7 +182,9 @@ class PartNode[P: Part[Any, Any]](ConfiguredNode):
     def _finish_tick(self, header: Any, started: float) -> None:
         """Publish what nobody waits for: the events, and the wall time that the answer took."""
         self._timing.publish(
-            Timing(header=Header(stamp=header.stamp), node=self.get_name(), compute_time=perf_counter() - started)
+            Timing(
+                header=Header(stamp=header.stamp), node=self.get_name(), compute_time=perf_counter() - started
+            )
         )
         for event in self.part.take_events():
             self.get_logger().info(f"tick {event.tick}: {event.kind}: {event.detail}")
@@ -213,7 +217,8 @@ def _answer_from(pool: ThreadPoolExecutor, service: Service) -> None:
 def run(make_node: Callable[[], ConfiguredNode], fly: Callable[[Any], None] = ConfiguredNode.spin) -> int:
     """Body of every executable: make the node, let it fly, and end with the exit status.
 
-    Signals only set `STOP`, since a node that has been asked to stop still has to hand over what it published or recorded.
+    Signals only set `STOP`, since a node that has been asked to stop still has to hand over what it
+    published or recorded.
 
     Returns:
         0 after an ordinary end or an interruption, 2 when something given to the node is not allowed.

@@ -18,6 +18,8 @@ from formation_gnc.plant.sensors import Sensors, SensorSuite
 LONGEST_STEP = 10.0
 """Integration step (s) above which a tick is divided: of order eight, it keeps an orbit in LEO below 1 mm."""
 
+NO_ANSWER = np.full(3, np.nan)
+
 
 @dataclass(frozen=True)
 class DeputyParameters:
@@ -162,8 +164,8 @@ class Plant:
         rotation = hill_rotation(self._states[0])
         accelerations = np.zeros((len(self._names) + 1, 3))
         for index, name in enumerate(self._names):
-            force = forces.get(name)
-            self._missed[index] = force is None or not np.isfinite(force).all()
+            force = forces.get(name, NO_ANSWER)
+            self._missed[index] = not np.isfinite(force).all()
             limit = self._limits[index]
             self._forces[index] = np.zeros(3) if self._missed[index] else np.clip(force, -limit, limit)
             accelerations[index + 1] = self._forces[index] @ rotation / self._masses[index]
