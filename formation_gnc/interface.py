@@ -157,3 +157,12 @@ class Event:
     node: str
     kind: str
     detail: str
+
+
+@dataclass(slots=True)
+class Timing:
+    """Wall time that a node took for a tick; apart from everything that must be reproducible."""
+
+    time: int
+    node: str
+    compute_time: float

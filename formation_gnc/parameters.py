@@ -18,6 +18,9 @@ import yaml
 
 from formation_gnc.errors import ConfigurationError
 
+OWN_OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides")
+"""Beginnings of the names of parameters that every ROS node has, or may be given, besides its schema."""
+
 
 class _Loader(yaml.SafeLoader):
     """Reads numbers such as 1e-6, which YAML 1.1 takes for text, as ROS reads them."""

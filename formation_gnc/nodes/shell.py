@@ -31,7 +31,7 @@ from formation_gnc.errors import ConfigurationError
 from formation_gnc.interface import Event
 from formation_gnc.nodes import topics
 from formation_gnc.nodes.conversion import from_message, message_type, to_message
-from formation_gnc.parameters import Leaf, dump, leaves, load, read_yaml
+from formation_gnc.parameters import OWN_OF_ROS, Leaf, dump, leaves, load, read_yaml
 from formation_gnc.part import Part
 
 REFUSED_BY_ROS = (RCLInvalidROSArgsError, UnknownROSArgsError, RCLError, RMWError)
@@ -42,10 +42,6 @@ CHECK_PERIOD = 0.1
 
 FAREWELL = 1.0
 """Wall time (s) that a node waits at its end for its last messages to arrive."""
-
-OWN_OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides")
-"""Parameters that every ROS node has, or may be given, besides its schema."""
-
 
 STOP = Future()
 """Done when the process has been asked to stop, by SIGINT or SIGTERM."""
