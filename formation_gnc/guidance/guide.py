@@ -40,7 +40,9 @@ class Guide(Part[Any, Formation]):
 
     def design(self, parameters: Any) -> Formation:
         """The named formation with its own parameters."""
-        return FORMATIONS[parameters.formation](getattr(parameters, parameters.formation), parameters)
+        return FORMATIONS[parameters.formation](
+            getattr(parameters, parameters.formation), parameters.mean_motion
+        )
 
     def on_tick(self, estimate: Estimate) -> Target:
         """The target at the estimate's stamp and its preview."""
