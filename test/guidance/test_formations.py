@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from formation_gnc.errors import ConfigurationError
 from formation_gnc.guidance.formation import Formation
 from formation_gnc.guidance.guide import GuidanceParameters, Guide
 from formation_gnc.guidance.leader_follower import LeaderFollower, LeaderFollowerParameters
@@ -164,3 +165,13 @@ def test_a_formation_is_swapped_in_flight_at_a_tick(at: Callable[[float], Estima
     assert np.abs(target.relative_state[0]) <= 50.0
     swapped.adopt(swapped.prepare({"formation": "leader_follower", "leader_follower.separation": 40.0}))
     assert swapped.on_tick(at(21.0)).relative_state.tolist() == [0.0, -40.0, 0.0, 0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    "constants", [{"rho": 1e308}, {"a": -1e9}, {"b": 1e300}, {"m": 1e200, "rho": 1e200}, {"n": 1e7}]
+)
+def test_a_formation_whose_targets_would_overflow_is_refused(constants: dict[str, float]) -> None:
+    values = {f"relative_orbit__{name}": value for name, value in constants.items()}
+    with pytest.raises(ConfigurationError, match="formation relative_orbit: its parameters put a target"):
+        guide(formation="relative_orbit", **values)
+    guide(formation="leader_follower", **values)  # what does not fly may be anything
