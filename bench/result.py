@@ -27,7 +27,7 @@ class Result:
 
 
 def interleaved(measures: Sequence[Callable[[], float]], rounds: int) -> list[float]:
-    """Medians of measurements taken in turn: a machine that changes pace changes it for all."""
+    """Medians of several measurements taken in turn: when the machine changes pace, it does for all."""
     figures: list[list[float]] = [[] for _ in measures]
     for _ in range(rounds):
         for measure, taken in zip(measures, figures, strict=True):

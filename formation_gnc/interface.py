@@ -37,8 +37,7 @@ class EstimateStatus(IntEnum):
 
 
 class Refusal(IntEnum):
-    """Why something of a measurement was not used; the places in `Estimate.refusals`, constants of
-    Estimate.msg."""
+    """Why something of a measurement was not used: places in `Estimate.refusals`, its constants."""
 
     NOT_FINITE = 0
     GATE = 1
@@ -158,3 +157,12 @@ class Event:
     node: str
     kind: str
     detail: str
+
+
+@dataclass(slots=True)
+class Timing:
+    """Wall time that a node took for a tick; apart from everything that must be reproducible."""
+
+    time: int
+    node: str
+    compute_time: float

@@ -18,6 +18,9 @@ import yaml
 
 from formation_gnc.errors import ConfigurationError
 
+OWN_OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides")
+"""Beginnings of the names of parameters that every ROS node has, or may be given, besides its schema."""
+
 
 class _Loader(yaml.SafeLoader):
     """Reads numbers such as 1e-6, which YAML 1.1 takes for text, as ROS reads them."""
@@ -133,12 +136,12 @@ def leaves(
     the schema's own defaults, so that two nested schemas of one kind may have different ones.
     """
     hints = get_type_hints(schema)
-    for field in dataclasses.fields(schema):
+    fields = {field.name: field for field in dataclasses.fields(schema)}
+    for field in fields.values():
         kind, name = hints[field.name], prefix + field.name
         if "names" in field.metadata:
             source = field.metadata["names"]
-            default = {each.name: each.default for each in dataclasses.fields(schema)}[source]
-            listed = values.get(prefix + source, default)
+            listed = values.get(prefix + source, fields[source].default)
             for key in listed if _is_list(listed) else ():
                 yield from leaves(get_args(kind)[1], values, f"{prefix}{key}.")
             continue

@@ -59,7 +59,7 @@ class Part[P: Schedulable, D](ABC):
         self.configuration: Configuration[P, D] = Configuration(parameters, self.design(parameters), {})
         self._foreseen: list[tuple[int, Configuration[P, D]]] = []
         latest = self.configuration
-        for at, changes in sorted(map(_scheduled, parameters.schedule), key=lambda entry: entry[0]):
+        for at, changes in sorted(map(scheduled, parameters.schedule), key=lambda entry: entry[0]):
             latest = self._design_from(latest.parameters, changes)
             self._foreseen.append((at, latest))
 
@@ -127,7 +127,7 @@ class Part[P: Schedulable, D](ABC):
         self.take_over(old, new)
         before = dump(old.parameters)
         detail = ", ".join(
-            f"{name}: {_text(before[name])} -> {_text(value)}" for name, value in new.changes.items()
+            f"{name}: {text_of(before[name])} -> {text_of(value)}" for name, value in new.changes.items()
         )
         self.record(time, "parameters", detail)
 
@@ -141,7 +141,8 @@ class Part[P: Schedulable, D](ABC):
         return events
 
 
-def _scheduled(entry: str) -> tuple[int, dict[str, Any]]:
+def scheduled(entry: str) -> tuple[int, dict[str, Any]]:
+    """Time (ns) and changes of one entry of a schedule; raises ConfigurationError when it cannot be read."""
     try:
         changes = read_yaml(entry)
         at = round(float(changes.pop("at")) * NANOSECONDS)
@@ -153,5 +154,6 @@ def _scheduled(entry: str) -> tuple[int, dict[str, Any]]:
         ) from None
 
 
-def _text(value: Any) -> str:
+def text_of(value: Any) -> str:
+    """A parameter's value as events tell it."""
     return str(list(value)) if isinstance(value, tuple) else str(value)

@@ -2,6 +2,7 @@ from typing import Any
 
 import pytest
 
+from formation_gnc.nodes import topics
 from formation_gnc.parameters import dump, leaves, load
 from formation_gnc.reference import PAGE, SCHEMAS, page
 
@@ -37,3 +38,13 @@ def test_the_page_has_every_parameter_of_every_node(node: str) -> None:
     text = page()
     for leaf in leaves(SCHEMAS[node], {"deputies": ["DEPUTY"]}):
         assert f"| `{leaf.name}` | {leaf.type_name} |" in text
+
+
+def test_the_page_of_topics_names_every_topic_and_every_message() -> None:
+    text = PAGE.with_name("topics.md").read_text()
+    names = [value for name, value in vars(topics).items() if name.isupper() and isinstance(value, str)]
+    assert len(names) > 10
+    for name in names:
+        assert f"| `{name}` |" in text
+    for message in (PAGE.parents[2] / "msg_defs" / "msg").glob("*.msg"):
+        assert f"[`{message.stem}`](../../msg_defs/msg/{message.name})" in text

@@ -9,3 +9,8 @@ if [[ -e .venv/local_setup.bash ]]; then
 fi
 source .venv/setup.bash
 colcon build --event-handlers desktop_notification- status-
+
+# Compile the Numba kernels now, and once: the nodes of the first flight would each do it, all at the same time.
+source install/setup.bash
+cd install
+python -c 'import formation_gnc.nodes.plant, formation_gnc.nodes.navigation, formation_gnc.nodes.controller'

@@ -26,7 +26,7 @@ class Trajectory:
     nis: Vector
     """(N,) normalised innovation squared; 0 on ticks without readings."""
     applied: Matrix
-    """(M, 3) accelerations the thrusters gave over each tick, Hill frame, m/s^2; on all ticks."""
+    """(M, 3) accelerations by thrust over each tick, Hill frame, m/s^2; on all ticks of the truth."""
     applied_time: Vector
     """(M,) time at which each of those ticks began, s."""
     tick: float

@@ -17,7 +17,7 @@ POINTS = 4000
 
 
 def draw_overview(bag: Bag, path: Path, title: str) -> Path:
-    """Draw every deputy of a run, a row each: path, control error, estimation error with 3 sigma, thrust.
+    """Draw a row for every deputy: relative path, control error, estimation error with 3 sigma, thrust.
 
     Returns:
         The path of the PNG file.

@@ -1,5 +1,11 @@
 """Subcommands of `formation-gnc`, one module each: a docstring for its help, `add_arguments` and `run`."""
 
-from formation_gnc.commands import navigate, sil
+from formation_gnc.commands import compare, navigate, recover, replay, sil
 
-COMMANDS = {"sil": sil, "navigate": navigate}
+COMMANDS = {
+    "sil": sil,
+    "navigate": navigate,
+    "replay": replay,
+    "compare": compare,
+    "recover": recover,
+}

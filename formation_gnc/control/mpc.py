@@ -13,7 +13,7 @@ from formation_gnc.control.night import Night
 from formation_gnc.control.programme import Programme, facet_normals, facet_reach
 from formation_gnc.control.riccati import Weights, periodic_cost_to_go
 from formation_gnc.errors import DesignError
-from formation_gnc.interface import NANOSECONDS, Estimate, Matrix, Target, Vector
+from formation_gnc.interface import NANOSECONDS, Estimate, Target, Vector
 from formation_gnc.mission import Mission
 from formation_gnc.parameters import parameter
 
@@ -22,6 +22,21 @@ ACCURACY = 1e-4
 
 MOST_ITERATIONS = 2000
 """Iterations after which the answer does not count: some ten milliseconds at 30 steps."""
+
+SETTINGS = {
+    "verbose": False,
+    "eps_abs": ACCURACY,
+    "eps_rel": ACCURACY,
+    "max_iter": MOST_ITERATIONS,
+    "check_termination": 10,
+    "adaptive_rho": 1,  # by iterations, not by a clock
+    "adaptive_rho_interval": 50,
+    "polishing": False,
+}
+"""Of OSQP."""
+
+FARTHEST = 1e12
+"""Error, m, that nobody flies, and beyond which products overflow."""
 
 KEEP_OUT_WEIGHT = 1e4
 """Cost of a keep-out sphere entered by one position error, over the weight of that error."""
@@ -274,21 +289,15 @@ class ModelPredictiveController(Controller):
         self._hessian_rest = slack
         pattern.data = self._hessian(self._programmes[0])
         size = self._rows.shape[0]
+        self.matrices = sparse.csc_matrix(pattern), sparse.csc_matrix(self._rows)
         self._solver = osqp.OSQP()
         self._solver.setup(
-            sparse.csc_matrix(pattern),
+            self.matrices[0],
             np.zeros(count + extra),
-            sparse.csc_matrix(self._rows),
+            self.matrices[1],
             np.full(size, -1.0),
             np.full(size, 1.0),
-            verbose=False,
-            eps_abs=ACCURACY,
-            eps_rel=ACCURACY,
-            max_iter=MOST_ITERATIONS,
-            check_termination=10,
-            adaptive_rho=1,  # by iterations, not by a clock
-            adaptive_rho_interval=50,
-            polishing=False,
+            **SETTINGS,
         )
 
     @property
@@ -339,19 +348,18 @@ class ModelPredictiveController(Controller):
     def _solve(self, estimate: Estimate, target: Target) -> Command | None:
         """The first force of a new plan, or None with the reason in `_answer`."""
         parameters, count = self._parameters, 3 * self._steps
+        if not np.abs(estimate.relative_state - target.relative_state).max() < FARTHEST:
+            self._answer = "the error is out of any range"
+            return None
         programme = self._programme_at(estimate.time)
-        free = programme.free @ estimate.relative_state - self._goal(programme, target).ravel()
         gradient = np.zeros(count + self._extra)
-        gradient[:count] = programme.gradient @ free
+        gradient[:count], cost_of_free = self._error_of_free_motion(programme, estimate, target)
         if parameters.cost == "absolute":
             gradient[count : 2 * count] = programme.price
         lower, upper = self._bounds(estimate.time)
         rows = {}
         if parameters.keep_out_radius > 0.0:
             rows = {"Ax": self._keep_out(programme, estimate, lower)}
-        if not (np.abs(gradient) < 1e20).all():
-            self._answer = "the error is out of any range"
-            return None
         self._solver.update(q=gradient, l=lower, u=upper, **rows)
         result = self._solver.solve(raise_error=False)
         self._answer = result.info.status
@@ -373,7 +381,7 @@ class ModelPredictiveController(Controller):
             size = np.linalg.norm(self._plan, axis=1, keepdims=True)
             self._plan *= np.minimum(1.0, parameters.total_thrust / np.maximum(size, 1e-300))
         self._planned_at = estimate.time
-        cost = 2.0 * result.info.obj_val / programme.scale + free @ programme.weight_of_free(free)
+        cost = 2.0 * result.info.obj_val / programme.scale + cost_of_free
         return Command(self._plan[0], result.info.status, int(result.info.iter), float(cost))
 
     def _programme_at(self, time: int) -> Programme:
@@ -386,20 +394,23 @@ class ModelPredictiveController(Controller):
             self._solver.update(Px=self._hessian(self._programmes[place]))
         return self._programmes[place]
 
-    def _goal(self, programme: Programme, target: Target) -> Matrix:
-        """(N, 6) target states at the ends of the steps."""
+    def _error_of_free_motion(
+        self, programme: Programme, estimate: Estimate, target: Target
+    ) -> tuple[Vector, float]:
+        """Scaled gradient at no thrust, and its cost."""
         horizon = self._parameters.horizon
-        ahead = (
-            min(len(target.preview), horizon)
-            if abs(target.preview_step - self._parameters.step) < 1e-9
-            else 0
-        )
-        goal = (programme.free @ target.relative_state).reshape(horizon, 6)
-        if ahead:
-            goal[:ahead] = target.preview[:ahead]
-            for step in range(ahead, horizon):
-                goal[step] = programme.steps[step] @ goal[step - 1]
-        return goal
+        now = estimate.relative_state - target.relative_state
+        if not len(target.preview) or abs(target.preview_step - self._parameters.step) > 1e-9:
+            # The target moves freely: so does the error, from the error of now.
+            return programme.gradient_of_state @ now, float(now @ programme.cost_of_state @ now)
+        goal = np.empty((horizon, 6))
+        ahead = min(len(target.preview), horizon)
+        goal[:ahead] = target.preview[:ahead]
+        for step in range(ahead, horizon):
+            goal[step] = programme.steps[step] @ goal[step - 1]
+        error = (programme.free @ estimate.relative_state).reshape(horizon, 6) - goal
+        weighted = (programme.weight @ error[:, :, None])[:, :, 0]
+        return programme.gradient @ error.ravel(), float(np.sum(error * weighted))
 
     def _bounds(self, time: int) -> tuple[Vector, Vector]:
         """Bounds of all rows; those that no time and no force change are made once."""

@@ -25,6 +25,10 @@ class Programme:
     """Upper triangle, column by column, scaled."""
     gradient: Matrix
     """(3 M, 6 N) scaled gradient from the error of free motion."""
+    gradient_of_state: Matrix
+    """(3 M, 6) the same from the error at the start."""
+    cost_of_state: Matrix
+    """(6, 6) cost of free motion from the error at the start."""
     price: float | Vector
     """Scaled linear cost of the forces' magnitudes."""
     scale: float
@@ -46,6 +50,7 @@ class Programme:
         weight = np.repeat(running[None], horizon, axis=0)
         weight[-1] += end
         weighted = (weight @ forced).reshape(6 * horizon, count)
+        unforced = free.reshape(6 * horizon, 6)
         stacked = forced.reshape(6 * horizon, count)
         hessian = stacked.T @ weighted
         price = np.zeros(count)
@@ -56,19 +61,16 @@ class Programme:
         scale = 1.0 / float(np.diag(hessian).mean())
         return cls(
             phi,
-            free.reshape(6 * horizon, 6),
+            unforced,
             stacked,
             weight,
             scale * hessian.T[np.tril_indices(count)],
             scale * weighted.T,
+            scale * weighted.T @ unforced,
+            unforced.T @ (weight @ free).reshape(6 * horizon, 6),
             scale * price,
             scale,
         )
-
-    def weight_of_free(self, error: Vector) -> Vector:
-        """(6 N,) weighted error."""
-        result: Vector = (self.weight @ error.reshape(-1, 6, 1)).ravel()
-        return result
 
 
 @cache

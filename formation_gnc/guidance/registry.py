@@ -1,10 +1,26 @@
 """All formations by name: a new formation is one file and one line here."""
 
+from formation_gnc.guidance.equidistant import Equidistant
 from formation_gnc.guidance.formation import Formation
+from formation_gnc.guidance.general_circular_orbit import GeneralCircularOrbit
+from formation_gnc.guidance.helix import Helix
 from formation_gnc.guidance.leader_follower import LeaderFollower
+from formation_gnc.guidance.moving_plane import MovingPlane
+from formation_gnc.guidance.projected_circular_orbit import ProjectedCircularOrbit
 from formation_gnc.guidance.relative_orbit import RelativeOrbit
+from formation_gnc.guidance.slot_list import SlotList
+from formation_gnc.guidance.tetrahedral import Tetrahedral
+from formation_gnc.guidance.three_in_plane_one_out import ThreeInPlaneOneOut
 
 FORMATIONS: dict[str, type[Formation]] = {
     "leader_follower": LeaderFollower,
     "relative_orbit": RelativeOrbit,
+    "projected_circular_orbit": ProjectedCircularOrbit,
+    "general_circular_orbit": GeneralCircularOrbit,
+    "three_in_plane_one_out": ThreeInPlaneOneOut,
+    "equidistant": Equidistant,
+    "tetrahedral": Tetrahedral,
+    "helix": Helix,
+    "moving_plane": MovingPlane,
+    "slot_list": SlotList,
 }

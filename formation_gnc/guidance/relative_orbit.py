@@ -6,7 +6,6 @@ import numpy as np
 
 from formation_gnc.guidance.formation import Formation
 from formation_gnc.interface import Matrix, Vector
-from formation_gnc.mission import Mission
 from formation_gnc.parameters import parameter
 
 
@@ -39,10 +38,10 @@ class RelativeOrbit(Formation):
 
     Parameters = RelativeOrbitParameters
 
-    def __init__(self, parameters: RelativeOrbitParameters, mission: Mission) -> None:
+    def __init__(self, parameters: RelativeOrbitParameters, mean_motion: float, slot: int = 0) -> None:
         """Any constants will do."""
         self._constants = parameters
-        self._rate = mission.mean_motion
+        self._rate = mean_motion
 
     def states(self, times: Vector) -> Matrix:
         """States at times (N,), Joshi 4.14-4.19."""

@@ -1,6 +1,7 @@
 """The filters to choose from: FilterPy's, over the relative state in the Hill frame."""
 
 from collections.abc import Callable
+from functools import lru_cache
 from math import sqrt
 from typing import Protocol
 
@@ -16,6 +17,12 @@ from formation_gnc.interface import Matrix, Vector
 from formation_gnc.navigation import kernels
 from formation_gnc.navigation.measurement import Readings, pseudo_jacobian, pseudo_measurements
 from formation_gnc.navigation.process import Leg, ProcessModel
+
+
+@lru_cache(maxsize=16)
+def unit(size: int) -> Matrix:
+    """Covariance of readings in their own standard deviations."""
+    return np.eye(size)
 
 
 class RelativeFilter(Protocol):
@@ -74,7 +81,7 @@ class ExtendedFilter(ExtendedKalmanFilter):  # type: ignore[misc]
             variance = np.diag(noise)
             noise = noise / np.sqrt(np.outer(variance, variance))
         else:
-            noise = np.eye(len(variance))
+            noise = unit(len(variance))
         # In standard deviations: variances in m^2 and rad^2 are too far apart to invert together.
         scale = np.sqrt(variance)
         jacobian = jacobian / scale[:, None]

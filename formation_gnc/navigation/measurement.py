@@ -94,8 +94,8 @@ class Readings:
     def innovation(self, expected: Vector) -> Vector:
         """(..., k) reading minus expectation (..., k), angles the short way round."""
         difference: Vector = self.value - expected
-        turning = self.sensor == _RIGHT_ASCENSION
-        if turning.any():
+        if _RIGHT_ASCENSION in self.sensor.tolist():
+            turning = self.sensor == _RIGHT_ASCENSION
             difference[..., turning] = (difference[..., turning] + pi) % (2.0 * pi) - pi
         return difference
 

@@ -289,26 +289,25 @@ class Navigator(Part[NavigationParameters, Design]):
             self._tell_blind(flight)
 
     def on_tick(self, measurement: Measurement) -> Estimate | None:
-        """The estimate at the measurement's stamp; none for one that is refused, and while there is no
-        state to start from."""
+        """The estimate at the stamp; none for what is refused, and while there is no state to start from."""
         acquire = self._acquires(measurement)
         if acquire is None:
             return None
         if acquire and measurement.time < self._time:
             self._refusals = Refusals()  # time runs backwards: a new run
         self.begin_tick(measurement.time)
-        status = EstimateStatus.TRACKING
         if acquire:
-            flight = self._acquire(measurement)
-            status = EstimateStatus.ACQUIRED
-        else:
-            assert self._flight is not None
-            flight = self._flight
-            self._predict(flight, measurement)
-            if not kernels.sound(flight.filter.x, flight.filter.P):
-                self._give_up(measurement.time, "prediction not finite")
-                return None
-        estimate = self._update(flight, measurement, status)
+            self._acquire(measurement)
+        flight = self._flight
+        assert flight is not None
+        try:
+            if not acquire:
+                self._predict(flight, measurement)
+            status = EstimateStatus.ACQUIRED if acquire else EstimateStatus.TRACKING
+            estimate = self._update(flight, measurement, status)
+        except (ArithmeticError, ValueError) as error:  # LinAlgError is a ValueError
+            self._give_up(measurement.time, f"{type(error).__name__}: {error}")
+            estimate = None
         for text in self._refusals.news():
             self.record(measurement.time, "refused", text)
         return estimate
@@ -390,6 +389,8 @@ class Navigator(Part[NavigationParameters, Design]):
             tick = stride(gap, self.parameters.acceleration_density)
         self._fly(flight, measurement.chief_state, self._acceleration(flight, measurement), tick)
         self._watch_chief(flight, measurement)
+        if not kernels.sound(flight.filter.x, flight.filter.P):
+            raise ArithmeticError("the prediction is not finite")
 
     def _fly(self, flight: Flight, told: Vector, acceleration: Vector, over: Stride) -> None:
         chief, flight.chief_known = _follow(flight.chief, told, over)
@@ -448,7 +449,6 @@ class Navigator(Part[NavigationParameters, Design]):
             )
             if readings is not None:
                 admitted = len(readings.value)
-                before = flight.filter.x, flight.filter.P
                 weighed = self._weigh(flight, readings)
                 if weighed is not None:
                     readings, offset, variance, jacobian = weighed
@@ -458,9 +458,7 @@ class Navigator(Part[NavigationParameters, Design]):
                     nis = flight.filter.correct(self._pseudo(readings))
                     flight.last_reading = flight.time
                 if not (kernels.sound(flight.filter.x, flight.filter.P) and isfinite(nis)):
-                    flight.filter = FILTERS[self.parameters.filter](*before)
-                    self._give_up(measurement.time, "update not finite")
-                    return None
+                    raise ArithmeticError("the update is not finite")
                 verdict, factor = flight.consistency.judge(nis, len(used), admitted - len(used))
                 if verdict is Verdict.GIVE_UP:
                     self._give_up(measurement.time, "readings contradict the state, however uncertain")

@@ -13,6 +13,9 @@ WORDS = {reason: reason.name.lower().replace("_", " ") for reason in Refusal}
 MEMORY = 20
 """Times of readings of a sensor above which those are forgotten that are too old to come again."""
 
+FARTHEST, FASTEST = 1e9, 1.2e4
+"""Beyond what orbits about the Earth reach: distance from its centre, m, and speed, m/s."""
+
 _KNOWN = frozenset(int(sensor) for sensor in Sensor)
 
 
@@ -111,10 +114,11 @@ class Screen:
 
 
 def credible_fix(fix: Vector, chief: Vector) -> bool:
-    """Whether an acquisition fix (6,) can be one: finite, and not inside the Earth."""
-    place = fix[:3].tolist()
-    place[0] += float(np.sqrt(chief[:3] @ chief[:3]))
-    return all(map(isfinite, fix.tolist())) and sum(each * each for each in place) > EARTH_RADIUS**2
+    """Whether an acquisition fix (6,) can be one: in an orbit, not inside the Earth."""
+    x, y, z, vx, vy, vz = fix.tolist()
+    height = x + float(np.sqrt(chief[:3] @ chief[:3]))
+    above = EARTH_RADIUS**2 < height * height + y * y + z * z < FARTHEST**2
+    return bool(above and vx * vx + vy * vy + vz * vz < FASTEST**2)
 
 
 def credible_chief(chief: Vector) -> bool:
@@ -126,4 +130,4 @@ def credible_chief(chief: Vector) -> bool:
     square, speed = x * x + y * y + z * z, vx * vx + vy * vy + vz * vz
     radial = x * vx + y * vy + z * vz
     across = square * speed - radial * radial
-    return square > EARTH_RADIUS**2 and 1.0 < across < 1e26 and speed < 1.2e4**2
+    return EARTH_RADIUS**2 < square < FARTHEST**2 and across > 1.0 and speed < FASTEST**2

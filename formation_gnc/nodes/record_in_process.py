@@ -3,15 +3,16 @@
 from collections.abc import Callable
 from typing import Any
 
-from rclpy.serialization import serialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
 
 from formation_gnc import interface
 from formation_gnc.interface import NANOSECONDS
 from formation_gnc.nodes import topics
-from formation_gnc.nodes.conversion import message_type, to_message
+from formation_gnc.nodes.conversion import from_message, message_type, to_message
 from formation_gnc.recording.decode import installed_type
-from formation_gnc.recording.writer import BagWriter
+from formation_gnc.recording.reader import Bag
+from formation_gnc.recording.writer import BagWriter, TopicDefinition
 
 
 class InProcessRecorder:
@@ -25,19 +26,52 @@ class InProcessRecorder:
 
     def __call__(self, topic: str, record: Any) -> None:
         """Write one record; the clock follows each truth, as the plant publishes it."""
-        self._write(topic, to_message(record), message_type(type(record)), record.time)
+        kind: Any = type(record)
+        self._write(topic, to_message(record), message_type(kind), record.time)
         if isinstance(record, interface.Truth):
             clock = Clock()
             clock.clock.sec, clock.clock.nanosec = divmod(record.time, NANOSECONDS)
             self._write(topics.CLOCK, clock, Clock, record.time)
 
-    def _write(self, topic: str, message: Any, kind: Any, time: int) -> None:
+    def copy(self, source: Bag, topic: str, data: bytes, time: int) -> None:
+        """Write a message of another bag as it is."""
         if topic not in self._counts:
-            type_name = f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}"
-            self._bag.add_topic(topic, type_name, topics.DEPTH)
+            schema, channel = source.definition(topic)
+            assert schema is not None, "a bag gives canonical messages of defined topics only"
+            definition = TopicDefinition(
+                schema.name, schema.data, schema.encoding, channel.message_encoding, channel.metadata
+            )
+            self._bag.add_defined_topic(topic, definition)
             self._counts[topic] = 0
+        self._counts[topic] += 1
+        self._bag.write(topic, data, time, self._counts[topic])
+
+    def _write(self, topic: str, message: Any, kind: Any, time: int) -> None:
+        if topic not in self._canonical:
+            type_name = f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}"
+            if topic not in self._counts:
+                self._bag.add_topic(topic, type_name, topics.DEPTH)
+                self._counts[topic] = 0
             self._canonical[topic] = installed_type(type_name).canonical
         self._counts[topic] += 1
         # serialize_message leaves what was in memory in the gaps between fields; DDS does not
         data = self._canonical[topic](serialize_message(message))
         self._bag.write(topic, data, time, self._counts[topic])
+
+
+RECORDS = {
+    "events": interface.Event,
+    "measurement": interface.Measurement,
+    "estimate": interface.Estimate,
+    "target": interface.Target,
+    "thrust": interface.Thrust,
+    "status": interface.Status,
+    "timing": interface.Timing,
+}
+"""Kinds of record by the last word of their topics."""
+
+
+def read_record(topic: str, data: bytes) -> Any:
+    """The record that a message carries, given its topic and CDR bytes."""
+    record = RECORDS[topic.rpartition("/")[2]]
+    return from_message(record, deserialize_message(data, message_type(record)))

@@ -45,8 +45,8 @@ class RecorderParameters(Mission):
 class RecorderNode(ConfiguredNode):
     """Subscribes to every topic there is and writes what comes, as it came.
 
-    Messages are stamped with simulated time: their own header's for the project's messages, the latest tick's
-    for others.
+    Messages are stamped with simulated time: their own header's for the project's messages, the latest
+    tick's for others.
     """
 
     def __init__(self) -> None:
@@ -155,8 +155,7 @@ class RecorderNode(ConfiguredNode):
 
 
 def _first_stamp(data: bytes) -> int:
-    """The stamp that a message begins with, in ns: after four bytes that tell the encoding, seconds and
-    nanoseconds."""
+    """The stamp that a message begins with, in ns: after four bytes that tell how it is encoded."""
     seconds, nanoseconds = struct.unpack_from("<iI", data, 4)
     return int(seconds * NANOSECONDS + nanoseconds)
 
@@ -164,14 +163,9 @@ def _first_stamp(data: bytes) -> int:
 def record(node: RecorderNode) -> None:
     """Record until told to stop, and then until nothing more comes."""
     quiet = Future()
-
-    def check() -> None:
-        if node.is_quiet():
-            quiet.set_result(None)
-
     try:
         node.spin()
-        node.spin((quiet,), check)
+        node.spin((quiet,), lambda: quiet.set_result(None) if node.is_quiet() else None)
     finally:
         node.close()
 

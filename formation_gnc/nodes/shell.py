@@ -10,7 +10,6 @@ from time import monotonic, perf_counter
 from typing import Any
 
 import rclpy
-import yaml
 from formation_gnc_msgs.msg import Timing
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, RMWError, UnknownROSArgsError
@@ -33,7 +32,7 @@ from formation_gnc.interface import Event
 from formation_gnc.nodes import topics
 from formation_gnc.nodes.conversion import from_message, message_type, to_message
 from formation_gnc.orbit.propagation import ImpactError
-from formation_gnc.parameters import Leaf, dump, leaves, load
+from formation_gnc.parameters import OWN_OF_ROS, Leaf, dump, leaves, load, read_yaml
 from formation_gnc.part import Part
 
 REFUSED_BY_ROS = (RCLInvalidROSArgsError, UnknownROSArgsError, RCLError, RMWError)
@@ -44,10 +43,6 @@ CHECK_PERIOD = 0.1
 
 FAREWELL = 1.0
 """Wall time (s) that a node waits at its end for its last messages to arrive."""
-
-OWN_OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides")
-"""Parameters that every ROS node has, or may be given, besides its schema."""
-
 
 STOP = Future()
 """Done when the process has been asked to stop, by SIGINT or SIGTERM."""
@@ -61,7 +56,7 @@ class ConfiguredNode(Node):  # type: ignore[misc]
     """
 
     def __init__(self, name: str, schema: type, namespace: str = "") -> None:
-        """Declare the schema's parameters, with the values of the command line and of parameter files."""
+        """Declare the schema's parameters, with values from the command line and parameter files."""
         self._executor: Any = None
         try:
             super().__init__(
@@ -100,8 +95,8 @@ class ConfiguredNode(Node):  # type: ignore[misc]
     ) -> None:
         """Work until any of the futures is done; `check` is called every `period` (s) or sooner.
 
-        One executor serves the node for all its life: a message that one has noticed but not handled is lost
-        to the next.
+        One executor serves the node for all its life: a message that one has noticed but not handled is
+        lost to the next.
         """
         if self._executor is None:
             self._executor = Executor()
@@ -129,7 +124,7 @@ def _from_command_line(arguments: Sequence[str]) -> Iterator[Parameter]:
     for flag, rule in pairwise(arguments):
         name, separator, value = rule.partition(":=")
         if flag in ("-p", "--param") and separator and ":" not in name:
-            yield Parameter(name, value=yaml.safe_load(value))
+            yield Parameter(name, value=read_yaml(value))
 
 
 def _descriptor(leaf: Leaf) -> ParameterDescriptor:
@@ -166,8 +161,7 @@ class PartNode[P: Part[Any, Any]](ConfiguredNode):
                 _answer_from(self._designer, service)
 
     def answer(self, respond: Callable[..., None], inputs: Mapping[str, type]) -> None:
-        """Call `respond` with one record of every input topic as soon as all of one stamp are there, once per
-        stamp."""
+        """Call `respond` once per stamp, when one record of it is there from every input topic."""
         latest: dict[str, Any] = {}
         for topic, record in inputs.items():
 
@@ -221,8 +215,8 @@ def _answer_from(pool: ThreadPoolExecutor, service: Service) -> None:
 def run(make_node: Callable[[], ConfiguredNode], fly: Callable[[Any], None] = ConfiguredNode.spin) -> int:
     """Body of every executable: make the node, let it fly, and end with the exit status.
 
-    Signals only set `STOP`, since a node that has been asked to stop still has to hand over what it published
-    or recorded.
+    Signals only set `STOP`, since a node that has been asked to stop still has to hand over what it
+    published or recorded.
 
     Returns:
         0 after an ordinary end or an interruption, 1 when a satellite came down, 2 when something given to

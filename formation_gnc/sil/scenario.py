@@ -119,6 +119,15 @@ def find_scenario(name: str) -> Path:
     )
 
 
+def given_to(path: Path, node: str) -> dict[str, Any]:
+    """What a parameter file gives a node, by dotted name.
+
+    Raises:
+        ConfigurationError: the file cannot be read, or is no ROS 2 parameter file.
+    """
+    return _given(_sections(path), node)
+
+
 def _directories() -> Iterator[Path]:
     source = Path(formation_gnc.__file__).resolve().parents[1]
     if (source / "package.xml").is_file():
@@ -129,14 +138,18 @@ def _directories() -> Iterator[Path]:
 
 
 def _load(schema: Any, sections: list[tuple[str, Mapping[str, Any]]], node: str) -> Any:
+    try:
+        return load(schema, _given(sections, node))
+    except ConfigurationError as error:
+        raise ConfigurationError(f"{node}: {error}") from None
+
+
+def _given(sections: list[tuple[str, Mapping[str, Any]]], node: str) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for pattern, section in sections:
         if _matches(pattern, node):
             values |= section
-    try:
-        return load(schema, values)
-    except ConfigurationError as error:
-        raise ConfigurationError(f"{node}: {error}") from None
+    return values
 
 
 def _matches(pattern: str, node: str) -> bool:
@@ -148,7 +161,7 @@ def _matches(pattern: str, node: str) -> bool:
     return re.fullmatch(expression, node) is not None
 
 
-def _sections(path: Path) -> list[tuple[str, dict[str, Any]]]:
+def _sections(path: Path) -> list[tuple[str, Mapping[str, Any]]]:
     """Node patterns of a parameter file with their parameters by dotted name, in the file's order."""
     try:
         document = read_yaml(path.read_text())

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from formation_gnc.errors import ConfigurationError
 from formation_gnc.guidance.formation import Formation
 from formation_gnc.guidance.guide import GuidanceParameters, Guide
 from formation_gnc.guidance.leader_follower import LeaderFollower, LeaderFollowerParameters
@@ -36,9 +37,9 @@ relative_orbits = st.builds(
     b=metres,
     m=slopes,
     n=slopes,
-).map(lambda parameters: RelativeOrbit(parameters, MISSION))
+).map(lambda parameters: RelativeOrbit(parameters, OMEGA))
 leader_followers = st.builds(LeaderFollowerParameters, separation=metres).map(
-    lambda parameters: LeaderFollower(parameters, MISSION)
+    lambda parameters: LeaderFollower(parameters, OMEGA)
 )
 free_formations = relative_orbits | leader_followers
 times = st.floats(0.0, 1e5)
@@ -91,7 +92,7 @@ def test_a_relative_orbit_closes_but_for_a_drift_of_three_pi_times_the_radial_of
 
 def test_the_relative_orbit_is_an_ellipse_of_two_to_one_in_a_tilted_plane() -> None:
     parameters = RelativeOrbitParameters(rho=500.0, theta=0.3, b=-200.0, m=0.4, n=-0.7)
-    x, y, z, *_ = RelativeOrbit(parameters, MISSION).states(np.linspace(0.0, ORBIT, 50)).T
+    x, y, z, *_ = RelativeOrbit(parameters, OMEGA).states(np.linspace(0.0, ORBIT, 50)).T
     assert x**2 + ((y + 200.0) / 2.0) ** 2 == pytest.approx(500.0**2)
     assert z == pytest.approx(0.4 * x - 0.7 * (y + 200.0))
     assert x[0] == pytest.approx(500.0 * math.sin(0.3))
@@ -99,7 +100,7 @@ def test_the_relative_orbit_is_an_ellipse_of_two_to_one_in_a_tilted_plane() -> N
 
 def test_a_relative_orbit_projects_to_a_circle_as_seen_from_the_earth_when_its_slope_is_two() -> None:
     y, z = (
-        RelativeOrbit(RelativeOrbitParameters(rho=500.0, m=2.0), MISSION)
+        RelativeOrbit(RelativeOrbitParameters(rho=500.0, m=2.0), OMEGA)
         .states(np.linspace(0, ORBIT, 50))
         .T[1:3]
     )
@@ -108,7 +109,7 @@ def test_a_relative_orbit_projects_to_a_circle_as_seen_from_the_earth_when_its_s
 
 @given(metres, st.lists(times, max_size=5))
 def test_the_follower_stays_where_it_is_behind_the_leader(separation: float, at: list[float]) -> None:
-    states = LeaderFollower(LeaderFollowerParameters(separation), MISSION).states(np.array(at))
+    states = LeaderFollower(LeaderFollowerParameters(separation), OMEGA).states(np.array(at))
     assert states.tolist() == [[0.0, -separation, 0.0, 0.0, 0.0, 0.0]] * len(at)
 
 
@@ -143,7 +144,7 @@ def at() -> Callable[[float], Estimate]:
 
 def test_the_target_is_the_formations_state_at_the_stamp(at: Callable[[float], Estimate]) -> None:
     target = guide(formation="relative_orbit", relative_orbit__rho=300.0).on_tick(at(77.0))
-    formation = RelativeOrbit(RelativeOrbitParameters(rho=300.0), MISSION)
+    formation = RelativeOrbit(RelativeOrbitParameters(rho=300.0), OMEGA)
     assert (target.time, target.formation) == (77 * NANOSECONDS, "relative_orbit")
     assert target.relative_state.tolist() == formation.states(np.array([77.0]))[0].tolist()
     assert target.preview.shape == (0, 6)
@@ -164,3 +165,13 @@ def test_a_formation_is_swapped_in_flight_at_a_tick(at: Callable[[float], Estima
     assert np.abs(target.relative_state[0]) <= 50.0
     swapped.adopt(swapped.prepare({"formation": "leader_follower", "leader_follower.separation": 40.0}))
     assert swapped.on_tick(at(21.0)).relative_state.tolist() == [0.0, -40.0, 0.0, 0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    "constants", [{"rho": 1e308}, {"a": -1e9}, {"b": 1e300}, {"m": 1e200, "rho": 1e200}, {"n": 1e7}]
+)
+def test_a_formation_whose_targets_would_overflow_is_refused(constants: dict[str, float]) -> None:
+    values = {f"relative_orbit__{name}": value for name, value in constants.items()}
+    with pytest.raises(ConfigurationError, match="formation relative_orbit: its parameters put a target"):
+        guide(formation="relative_orbit", **values)
+    guide(formation="leader_follower", **values)  # what does not fly may be anything

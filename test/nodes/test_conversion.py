@@ -89,7 +89,7 @@ def test_a_stamp_carries_every_nanosecond(time: int) -> None:
 
 @given(st.sampled_from([each for each in RECORDS if each is not interface.SatelliteTruth]).flatmap(records))
 def test_every_message_of_the_loop_names_its_frame(record: Any) -> None:
-    frames = {"Measurement": "inertial", "Truth": "inertial", "Event": ""}
+    frames = {"Measurement": "inertial", "Truth": "inertial", "Event": "", "Timing": ""}
     assert to_message(record).header.frame_id == frames.get(type(record).__name__, "hill")
 
 

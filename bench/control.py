@@ -1,0 +1,162 @@
+"""Compute per tick of the control laws; MPC beside the bare solver, and others, on the same programmes."""
+
+import importlib
+import importlib.util
+from collections.abc import Callable
+from time import thread_time
+from typing import Any
+
+import numpy as np
+import osqp
+from numpy.typing import NDArray
+
+from bench.result import Result
+from formation_gnc.control.controller import Controller, Vehicle
+from formation_gnc.control.hinf import HInfinityController, HinfParameters
+from formation_gnc.control.lqr import LinearQuadraticRegulator, LqrParameters
+from formation_gnc.control.mpc import SETTINGS, ModelPredictiveController, MpcParameters
+from formation_gnc.interface import NANOSECONDS, Estimate, Target
+from formation_gnc.mission import Mission, Orbit
+from formation_gnc.relative.hill import HillModel
+
+TICKS = 3000
+MISSION = Mission(Orbit(6978100.0), tick=1.0)
+VEHICLE = Vehicle(100.0, np.full(3, 0.01))
+START = np.array([40.0, -30.0, 20.0, 0.0, 0.0, 0.0])
+BRYSON: dict[str, Any] = {
+    "position_error": (10.0,) * 3,
+    "velocity_error": (0.1,) * 3,
+    "thrust": (0.002,) * 3,
+}
+
+
+def fly(law: Controller, start: NDArray[np.float64] = START) -> NDArray[np.float64]:
+    """Compute time of each command, s of this thread, over a noisy flight that begins at the thrust limit."""
+    noise = np.random.default_rng(1).standard_normal((TICKS, 6)) * np.repeat([0.1, 1e-4], 3)
+    phi, gamma = HillModel(MISSION.mean_motion).discretise(0.0, MISSION.tick)
+    state, times = start, np.empty(TICKS)
+    nowhere = np.empty((0, 6))
+    for tick in range(TICKS):
+        time = tick * NANOSECONDS
+        seen = Estimate(
+            time, state + noise[tick], np.zeros((6, 6)), np.zeros(6), 100.0, False, [], [], [], 0.0, 0
+        )
+        aim = Target(time, "", np.zeros(6), 60.0, nowhere)
+        started = thread_time()
+        force = law.command(seen, aim).force
+        times[tick] = thread_time() - started
+        state = phi @ state + gamma @ np.clip(force, -0.01, 0.01) / 100.0
+    return times
+
+
+def programmes() -> tuple[NDArray[np.float64], list[dict[str, Any]], tuple[Any, Any]]:
+    """Times of the MPC's commands, the programmes that it solved, and their matrices."""
+    law = ModelPredictiveController(MpcParameters(**BRYSON), MISSION, VEHICLE)
+    solver, asked = law._solver, []
+
+    class Listening:
+        """The solver, noting what it is asked."""
+
+        def update(self, **values: Any) -> None:
+            asked.append(values)
+            solver.update(**values)
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(solver, name)
+
+    law._solver = Listening()
+    fly(law)
+    plain = ModelPredictiveController(MpcParameters(**BRYSON), MISSION, VEHICLE)
+    return fly(plain), asked, law.matrices
+
+
+def solve_all(asked: list[dict[str, Any]], solve: Callable[[dict[str, Any]], Any]) -> NDArray[np.float64]:
+    """Compute time of each programme, s of this thread."""
+    times = np.empty(len(asked))
+    for index, values in enumerate(asked):
+        started = thread_time()
+        solve(values)
+        times[index] = thread_time() - started
+    return times
+
+
+def others(matrices: tuple[Any, Any]) -> dict[str, Callable[[dict[str, Any]], Any]]:
+    """The other solvers that are installed, each from a cold start."""
+    upper = matrices[0].toarray()
+    hessian = upper + np.triu(upper, 1).T
+    rows = matrices[1].toarray()
+    solvers: dict[str, Callable[[dict[str, Any]], Any]] = {}
+    if importlib.util.find_spec("daqp"):
+        daqp = importlib.import_module("daqp")
+
+        kinds = np.zeros(len(rows), dtype=np.intc)
+
+        def with_daqp(values: dict[str, Any]) -> Any:
+            return daqp.solve(
+                hessian, values["q"], np.empty((0, len(hessian))), values["u"], values["l"], kinds
+            )
+
+        solvers["DAQP"] = with_daqp
+    if importlib.util.find_spec("piqp"):
+        piqp = importlib.import_module("piqp")
+
+        solver = piqp.DenseSolver()
+        started = False
+
+        def with_piqp(values: dict[str, Any]) -> Any:
+            nonlocal started
+            if not started:
+                solver.setup(hessian, values["q"], None, None, None, None, None, values["l"], values["u"])
+                started = True
+            else:
+                solver.update(c=values["q"], x_l=values["l"], x_u=values["u"])
+            return solver.solve()
+
+        solvers["PIQP"] = with_piqp
+    return solvers
+
+
+def run() -> list[Result]:
+    """All figures of the control laws, in microseconds of compute."""
+    ticks, asked, matrices = programmes()
+    bare = osqp.OSQP()
+    rows = matrices[1].shape[0]
+    bare.setup(matrices[0], asked[0]["q"], matrices[1], np.full(rows, -1.0), np.full(rows, 1.0), **SETTINGS)
+
+    def with_osqp(values: dict[str, Any]) -> Any:
+        bare.update(**values)
+        return bare.solve(raise_error=False)
+
+    alone = solve_all(asked, with_osqp)
+    micro = 1e6
+    p99, median = float(np.percentile(ticks, 99)) * micro, float(np.median(ticks)) * micro
+    osqp_median = float(np.median(alone)) * micro
+    results = [
+        Result("MPC tick, 30 steps, 99th percentile against 1 ms", p99, 1000.0, "us", p99 / 1000.0, "<= 1"),
+        Result(
+            "MPC tick against bare OSQP, median", median, osqp_median, "us", median / osqp_median, "<= 1.5"
+        ),
+    ]
+    for name, solver in others(matrices).items():
+        theirs = float(np.median(solve_all(asked, solver))) * micro
+        results.append(
+            Result(
+                f"OSQP, warm, against {name}, cold, median",
+                osqp_median,
+                theirs,
+                "us",
+                osqp_median / theirs,
+                "",
+            )
+        )
+    near = START / 10.0
+    for label, law in {
+        "LQR": LinearQuadraticRegulator(LqrParameters(**BRYSON), MISSION, VEHICLE),
+        "H-infinity": HInfinityController(HinfParameters(), MISSION, VEHICLE),
+        "H-infinity, full information": HInfinityController(
+            HinfParameters(form="full_information"), MISSION, VEHICLE
+        ),
+    }.items():
+        taken = float(np.median(fly(law, near))) * micro
+        results.append(Result(f"{label} tick against MPC's", taken, median, "us", taken / median, ""))
+    return results

@@ -1,0 +1,94 @@
+"""Compare recorded runs: their figures side by side, and whether they are the same bits.
+
+Differences are against the first bag. Two runs are the same when every message of every GNC topic is, bit for
+bit; wall-clock topics do not count.
+"""
+
+import argparse
+import json
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from formation_gnc.analysis.compare import draw_comparison, gnc_topics, run_figures
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.recording.reader import Bag, Difference, identical
+
+SAME = "identical on every GNC topic"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the command."""
+    parser.add_argument("bags", metavar="bag", nargs="+", type=Path, help="two or more bags")
+    parser.add_argument("--plot", metavar="FILE", type=Path, help="draw them over time: .png, .pdf or .svg")
+    parser.add_argument("--json", action="store_true", help="print all as one JSON object")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Compare, print, draw."""
+    if len(options.bags) < 2:
+        raise ConfigurationError("compare: takes two bags or more")
+    if options.plot is not None and options.plot.suffix not in (".png", ".pdf", ".svg"):
+        raise ConfigurationError(f"plot {options.plot}: is not allowed; it must be a .png, .pdf or .svg file")
+    bags = [Bag(path) for path in options.bags]
+    figures = [run_figures(bag) for bag in bags]
+    differences = [identical(bags[0], other, gnc_topics(bags[0], other)) for other in bags[1:]]
+    if options.plot is not None:
+        try:
+            draw_comparison(bags, [str(path) for path in options.bags], options.plot)
+        except OSError as error:
+            raise ConfigurationError(f"plot {options.plot}: {error.strerror or error}") from None
+    if options.json:
+        print(json.dumps(_summary(options.bags, figures, differences), indent=2))
+    else:
+        _print(options.bags, figures, differences)
+    return 0
+
+
+def _summary(
+    paths: list[Path], figures: list[dict[str, dict[str, float]]], differences: list[list[Difference]]
+) -> dict[str, object]:
+    first = figures[0]
+    return {
+        "bags": [{"bag": str(path), "figures": each} for path, each in zip(paths, figures, strict=True)],
+        "differences": [
+            {
+                "bag": str(path),
+                "identical": not found,
+                "first_by_topic": [str(difference) for difference in found],
+                "figures": {
+                    part: {name: value - first[part][name] for name, value in values.items()}
+                    for part, values in each.items()
+                    if part in first
+                },
+            }
+            for path, each, found in zip(paths[1:], figures[1:], differences, strict=True)
+        ],
+    }
+
+
+def _print(
+    paths: list[Path], figures: list[dict[str, dict[str, float]]], differences: list[list[Difference]]
+) -> None:
+    console = Console(highlight=False)
+    table = Table()
+    table.add_column("figure")
+    for path in paths:
+        table.add_column(escape(str(path)), justify="right")
+    for path in paths[1:]:
+        table.add_column(escape(f"{path.name} - {paths[0].name}"), justify="right")
+    rows = dict.fromkeys((part, name) for each in figures for part, values in each.items() for name in values)
+    for part, name in rows:
+        values = [each.get(part, {}).get(name) for each in figures]
+        first = values[0]
+        cells = ["" if value is None else f"{value:.6g}" for value in values]
+        for value in values[1:]:
+            cells.append("" if value is None or first is None else f"{value - first:+.3g}")
+        table.add_row(escape(f"{part} {name}".strip()), *cells)
+    console.print(table)
+    for path, found in zip(paths[1:], differences, strict=True):
+        print(f"{path}: {SAME}" if not found else f"{path}: differs from {paths[0]}, first of each topic:")
+        for difference in found:
+            print(f"  {difference}")

@@ -1,0 +1,49 @@
+"""Rebuild a bag that was cut or damaged, as far as it can be read.
+
+Exit status 0: the bag is whole, or only its index was missing; 3: something is lost, and what; 1: nothing is
+left to save.
+"""
+
+import argparse
+import dataclasses
+import json
+import sys
+from pathlib import Path
+
+from formation_gnc.recording.recover import NOTHING_SAVED, recover
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the command."""
+    parser.add_argument("bag", type=Path, help="bag directory or .mcap file")
+    parser.add_argument(
+        "--output",
+        metavar="DIR",
+        type=Path,
+        help="directory to make (default: BAG_recovered)",
+    )
+    parser.add_argument("--json", action="store_true", help="print what came of it as one JSON object")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Recover, and say what was lost."""
+    bag = options.bag.absolute()
+    try:
+        recovery = recover(options.bag, options.output or bag.with_name(f"{bag.stem}_recovered"))
+    except OSError as error:
+        print(f"formation-gnc: {error.filename}: {error.strerror}", file=sys.stderr)
+        return NOTHING_SAVED
+    if options.json:
+        print(json.dumps(dataclasses.asdict(recovery), default=str, indent=2))
+        return recovery.status
+    for reason in recovery.reasons:
+        print(f"damaged: {reason}")
+    for topic, count in sorted(recovery.lost.items()):
+        print(f"lost: {count} messages of {topic}")
+    if recovery.output is not None:
+        print(f"{recovery.saved} messages saved in {recovery.output}")
+    elif recovery.status == NOTHING_SAVED:
+        print("nothing to save")
+    else:
+        print(f"whole: {recovery.saved} messages")
+    return recovery.status

@@ -1,0 +1,220 @@
+"""Flies recorded inputs through parts again: the same parameters give the recorded outputs, bit for bit.
+
+What flew is taken from the bag alone. Parameters are its metadata records `parameters NODE`; changes in
+flight are either scheduled there, or are the `/events` of kind `parameters` and are adopted again at their
+tick. A part is given an input only where it was given it in the recorded run, which its `timing` tells; a
+navigation that had acquired anew after ticks on which it was not there had been started again, and is here
+too.
+
+The truth is recorded, not flown: changed parts say what they would have commanded, and nothing answers them.
+"""
+
+import json
+import re
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+from formation_gnc.control.autopilot import Autopilot, ControllerParameters
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.guidance.guide import GuidanceParameters, Guide
+from formation_gnc.interface import EstimateStatus, Event, Timing
+from formation_gnc.navigation.navigator import NavigationParameters, Navigator
+from formation_gnc.parameters import OWN_OF_ROS, dump, leaves, load, read_yaml
+from formation_gnc.part import Part, scheduled, text_of
+from formation_gnc.recording.reader import Bag
+from formation_gnc.sil.runner import Sink
+
+
+@dataclass(frozen=True)
+class Kind:
+    """How a part is built, and which of its deputy's topics it hears and fills."""
+
+    schema: type
+    build: Callable[[str, Any], Any]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+
+KINDS = {
+    "navigation": Kind(NavigationParameters, Navigator, ("measurement",), ("estimate",)),
+    "guidance": Kind(GuidanceParameters, Guide, ("estimate",), ("target",)),
+    "controller": Kind(ControllerParameters, Autopilot, ("estimate", "target"), ("thrust", "status")),
+}
+
+Read = Callable[[str, bytes], Any]
+"""The record of a message, given its topic and CDR bytes."""
+
+Copy = Callable[[str, bytes, int], None]
+"""Takes what was recorded and is not flown again: topic, CDR bytes, stamp in ns."""
+
+
+class ReplayedPart:
+    """One part, flown again."""
+
+    def __init__(self, node: str, values: Mapping[str, Any]) -> None:
+        """Build it from its parameters; raises ConfigurationError for what cannot be flown."""
+        self.node = node
+        self.kind = KINDS[node.rpartition("/")[2]]
+        self.parameters: Any = load(self.kind.schema, values)
+        self._heard_last = True
+        self.start()
+
+    def start(self) -> None:
+        """Begin anew, as a process that was just started."""
+        self._part: Part[Any, Any] = self.kind.build(self.node, self.parameters)
+        self._foreseen = sorted(map(scheduled, self.parameters.schedule), key=lambda entry: entry[0])
+
+    def tick(self, time: int, inputs: list[Any], swaps: list[Event]) -> tuple[tuple[Any, ...], list[Event]]:
+        """Outputs, none while there is no state, and events of a tick on which `swaps` were recorded."""
+        due = [changes for at, changes in self._foreseen if at <= time]
+        del self._foreseen[: len(due)]
+        ours = [{name: text_of(value) for name, value in changes.items()} for changes in due]
+        for swap in swaps:
+            changes = _changes(swap.detail, dump(self._part.parameters))
+            if changes in ours:
+                ours.remove(changes)  # the schedule brings it about by itself
+            else:
+                self._part.adopt(self._part.prepare(self._typed(changes)))
+        answer = self._part.on_tick(*inputs)  # type: ignore[attr-defined]
+        records = () if answer is None else answer if isinstance(answer, tuple) else (answer,)
+        return records, self._part.take_events()
+
+    def heard(self, is_heard: bool, recorded: Any) -> bool:
+        """Whether to give it this tick's input; starts it again where it had been.
+
+        recorded: its output in the recorded run, if there is one.
+        """
+        if is_heard and not self._heard_last and getattr(recorded, "status", None) == EstimateStatus.ACQUIRED:
+            self.start()
+        self._heard_last = is_heard
+        return is_heard
+
+    def _typed(self, texts: Mapping[str, str]) -> dict[str, Any]:
+        kinds = {leaf.name: leaf.type for leaf in leaves(self.kind.schema, dump(self.parameters))}
+        return {name: text if kinds[name] is str else read_yaml(text) for name, text in texts.items()}
+
+
+def _changes(detail: str, known: Collection[str]) -> dict[str, str]:
+    """New values, as text, of an event `name: old -> new, name: old -> new`."""
+    names = "|".join(re.escape(name) for name in sorted(known, key=len, reverse=True))
+    pieces = re.split(rf"(?:^|, )({names}): ", detail)[1:]
+    changes = {name: text.rpartition(" -> ")[2] for name, text in zip(pieces[::2], pieces[1::2], strict=True)}
+    if not changes:
+        raise ConfigurationError(f"event {detail!r}: names no parameter that could be changed again")
+    return changes
+
+
+def parameters_of(bag: Bag, node: str) -> dict[str, Any]:
+    """Parameters that a node flew with at the start, as the bag has them; empty when it has none."""
+    recorded = bag.metadata.get(f"parameters {node}", {})
+    return {name: json.loads(text) for name, text in recorded.items() if not name.startswith(OWN_OF_ROS)}
+
+
+def nodes_of(bag: Bag, kinds: Collection[str]) -> list[str]:
+    """Full names of the bag's nodes of the named kinds, in the order in which they answer."""
+    unknown = [kind for kind in kinds if kind not in KINDS]
+    if unknown or not kinds:
+        raise ConfigurationError(f"nodes {', '.join(unknown) or 'none'}: must be some of {', '.join(KINDS)}")
+    deputies = sorted(
+        topic.split("/")[1] for topic in bag.topics if re.fullmatch("/[^/]+/measurement", topic)
+    )
+    if not deputies:
+        raise ConfigurationError(f"{bag.path}: has no measurements to fly again")
+    return [f"/{deputy}/{kind}" for deputy in deputies for kind in KINDS if kind in kinds]
+
+
+def replay(bag: Bag, parameters: Mapping[str, Mapping[str, Any]], read: Read, sink: Sink, copy: Copy) -> None:
+    """Fly a bag's inputs through parts again, tick by tick.
+
+    Args:
+        bag: the recorded run.
+        parameters: of every node to fly again, by full name, deputy by deputy in the order of `nodes_of`.
+        read: makes records of messages.
+        sink: takes topic and record of all that the parts say.
+        copy: takes every other message as it was recorded, sorted by stamp.
+
+    Raises:
+        ConfigurationError: parameters that cannot be flown, or a recorded change that these do not allow.
+    """
+    parts = []
+    for node, values in parameters.items():
+        if not values:
+            raise ConfigurationError(f"{bag.path}: has no parameters of {node}; give them in a file")
+        try:
+            parts.append(ReplayedPart(node, values))
+        except ConfigurationError as error:
+            raise ConfigurationError(f"{node}: {error}") from None
+    outputs = {_sibling(part.node, output) for part in parts for output in part.kind.outputs}
+    tick: dict[str, list[bytes]] = {}
+    time = None
+    for stamp, topic, messages in bag.by_stamp(list(bag.topics)):
+        if stamp != time and time is not None:
+            _fly_tick(bag, parts, outputs, time, tick, read, sink, copy)
+            tick = {}
+        time = stamp
+        tick[topic] = messages
+    if time is not None:
+        _fly_tick(bag, parts, outputs, time, tick, read, sink, copy)
+
+
+def _fly_tick(
+    bag: Bag,
+    parts: list[ReplayedPart],
+    outputs: Collection[str],
+    time: int,
+    tick: Mapping[str, list[bytes]],
+    read: Read,
+    sink: Sink,
+    copy: Copy,
+) -> None:
+    nodes = {part.node for part in parts}
+    swaps: dict[str, list[Event]] = {}
+    timed: set[str] = set()
+    for topic, messages in tick.items():
+        for data in messages:
+            if topic == "/events":
+                event = read(topic, data)
+                if event.node in nodes:
+                    if event.kind == "parameters":
+                        swaps.setdefault(event.node, []).append(event)
+                    continue
+            elif topic.endswith("/timing"):
+                node = _sibling(topic, read(topic, data).node)
+                timed.add(node)
+                if node in nodes:
+                    continue
+            if topic not in outputs:
+                copy(topic, data, time)
+    said: dict[str, Any] = {}
+    for part in parts:
+        topics = [_sibling(part.node, name) for name in part.kind.inputs]
+        inputs = [
+            said.get(topic) if topic in outputs else read(topic, tick[topic][-1]) if topic in tick else None
+            for topic in topics
+        ]
+        timing = _sibling(part.node, "timing")
+        is_timed = timing in bag.topics and bag.topics[timing].count > 0
+        output = _sibling(part.node, part.kind.outputs[0])
+        recorded = read(output, tick[output][-1]) if output in tick else None
+        if _sibling(part.node, "measurement") not in tick:
+            continue  # no tick of this deputy
+        if not part.heard(part.node in timed or not is_timed, recorded):
+            continue
+        if any(each is None for each in inputs):
+            continue
+        started = perf_counter()
+        records, events = part.tick(time, inputs, swaps.get(part.node, []))
+        for name, record in zip(part.kind.outputs, records, strict=False):
+            said[_sibling(part.node, name)] = record
+            sink(_sibling(part.node, name), record)
+        if is_timed:
+            sink(timing, Timing(time, part.node.rpartition("/")[2], perf_counter() - started))
+        for event in events:
+            sink("/events", event)
+
+
+def _sibling(name: str, other: str) -> str:
+    """Full name of what stands beside a node or topic in its deputy's namespace."""
+    return f"{name.rpartition('/')[0]}/{other}"

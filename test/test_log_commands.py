@@ -1,0 +1,198 @@
+"""The commands that take recorded runs, on runs flown in-process."""
+
+import json
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from formation_gnc.analysis.compare import gnc_topics
+from formation_gnc.cli import main
+from formation_gnc.nodes.record_in_process import read_record
+from formation_gnc.recording.reader import Bag, identical
+from formation_gnc.sil.replay import KINDS, nodes_of, parameters_of, replay
+from formation_gnc.sil.scenario import find_scenario
+
+
+@pytest.fixture(autouse=True)
+def handlers() -> Iterator[None]:
+    """Leave the signal handlers as they were."""
+    before = signal.getsignal(signal.SIGTERM)
+    yield
+    signal.signal(signal.SIGTERM, before)
+
+
+def fly(directory: Path, *arguments: str) -> Path:
+    assert main(["sil", "leader_follower", "--in-process", "--bag", str(directory), *arguments]) == 0
+    return directory
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return fly(tmp_path_factory.mktemp("bags") / "flown", "--duration", "300")
+
+
+@pytest.fixture(scope="module")
+def other(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return fly(tmp_path_factory.mktemp("bags") / "other", "--duration", "300", "--seed", "2")
+
+
+def test_recover_leaves_a_whole_bag_alone(flown: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["recover", str(flown)]) == 0
+    assert capsys.readouterr().out.startswith("whole: ")
+    assert not flown.with_name("flown_recovered").exists()
+
+
+def test_recover_saves_a_cut_bag_and_says_what_is_lost(
+    flown: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (mcap,) = flown.glob("*.mcap")
+    cut = tmp_path / "cut.mcap"
+    # a short flight is one chunk: whatever is cut from it is saved message by message
+    cut.write_bytes(mcap.read_bytes()[: mcap.stat().st_size // 2])
+    assert main(["recover", str(cut), "--output", str(tmp_path / "saved"), "--json"]) == 3
+    said = json.loads(capsys.readouterr().out)
+    assert said["status"] == 3
+    assert said["output"] == str(tmp_path / "saved")
+    assert any("was not closed" in reason or "chunk" in reason for reason in said["reasons"])
+    saved = Bag(tmp_path / "saved")
+    assert saved.damage is None
+    assert sum(topic.count for topic in saved.topics.values()) == said["saved"]
+    assert 0 < saved.topics["/truth"].count < Bag(flown).topics["/truth"].count
+    assert main(["recover", str(cut)]) == 3
+    assert (tmp_path / "cut_recovered").is_dir(), "beside the bag unless told otherwise"
+    assert "damaged: " in capsys.readouterr().out
+
+
+def test_recover_has_nothing_to_save_of_a_file_that_is_all_zeros(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "zeros.mcap").write_bytes(bytes(10_000))
+    assert main(["recover", str(tmp_path / "zeros.mcap")]) == 1
+    assert "nothing to save" in capsys.readouterr().out
+    assert not (tmp_path / "zeros_recovered").exists()
+
+
+def test_commands_refuse_a_bag_that_is_not_there_in_one_line(
+    tmp_path: Path, flown: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    missing = str(tmp_path / "missing")
+    for arguments in (["recover", missing], ["compare", str(flown), missing], ["compare", str(flown)]):
+        assert main(arguments) == 2
+        output, errors = capsys.readouterr()
+        assert output == ""
+        assert errors.count("\n") == 1
+
+
+def test_compare_says_what_is_the_same_and_what_is_not(
+    flown: Path, other: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    again = fly(tmp_path / "again", "--duration", "300")
+    capsys.readouterr()
+    picture = tmp_path / "plot.png"
+    assert main(["compare", str(flown), str(again), str(other), "--plot", str(picture)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert f"{again}: identical on every GNC topic" in lines
+    assert any(line.startswith(f"{other}: differs from {flown}") for line in lines)
+    assert any(line.startswith("  /deputy1/measurement at 0.000000000 s: ") for line in lines), (
+        "noise differs at once"
+    )
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert main(["compare", str(flown), str(again), str(other), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    same, changed = said["differences"]
+    assert same["identical"]
+    assert set(same["figures"]["deputy1"].values()) == {0.0}
+    assert not changed["identical"]
+    errors = [each["figures"]["deputy1"]["rms_error_m"] for each in said["bags"]]
+    assert changed["figures"]["deputy1"]["rms_error_m"] == errors[2] - errors[0] != 0.0
+
+
+def replayed(bag: Path, output: Path, *arguments: str) -> tuple[int, Bag]:
+    return main(["replay", str(bag), "--bag", str(output), *arguments]), Bag(output)
+
+
+# a second section for the same nodes, by another pattern, goes on top of the first
+SWAPS = """
+/*/controller:
+  ros__parameters: {schedule: ["{at: 100.0, algorithm: coast}", "{at: 200.0, algorithm: lqr}"]}
+/*/navigation: {ros__parameters: {schedule: ["{at: 50.0, sensors: [radius, latitude], gate: 4.0}"]}}
+"""
+
+
+@pytest.mark.parametrize("nodes", ["navigation,guidance,controller", "controller", "navigation", "guidance"])
+def test_an_unchanged_replay_gives_the_recorded_bits(
+    flown: Path, tmp_path: Path, nodes: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, again = replayed(flown, tmp_path / "again", "--nodes", nodes)
+    assert status == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "identical on every GNC topic"
+    assert {name: topic.count for name, topic in again.topics.items()} == {
+        name: topic.count for name, topic in Bag(flown).topics.items()
+    }
+    assert (
+        again.metadata["parameters /deputy1/controller"]
+        == Bag(flown).metadata["parameters /deputy1/controller"]
+    )
+
+
+def test_swaps_by_schedule_and_by_hand_are_flown_again_at_their_tick(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "swaps.yaml").write_text(find_scenario("leader_follower").read_text() + SWAPS)
+    bag = tmp_path / "swaps"
+    assert (
+        main(["sil", str(tmp_path / "swaps.yaml"), "--in-process", "--bag", str(bag), "--duration", "300"])
+        == 0
+    )
+    assert replayed(bag, tmp_path / "again")[0] == 0
+    assert list(Bag(bag).arrays("/events")["kind"]).count("parameters") == 3
+    # without the schedule in its parameters, the same swaps are changes that somebody made in flight
+    recorded = Bag(bag)
+    values = {node: parameters_of(recorded, node) for node in nodes_of(recorded, KINDS)}
+    for each in values.values():
+        each.pop("schedule", None)
+    said: list[tuple[str, int]] = []
+    outputs: list[tuple[str, Any]] = []
+    replay(
+        recorded,
+        values,
+        read_record,
+        lambda topic, record: outputs.append((topic, record)),
+        lambda topic, data, stamp: said.append((topic, stamp)),
+    )
+    laws = [record.algorithm for topic, record in outputs if topic == "/deputy1/status"]
+    assert laws == ["lqr"] * 100 + ["coast"] * 100 + ["lqr"] * 100
+    forces = np.array([record.force for topic, record in outputs if topic == "/deputy1/thrust"])
+    assert forces.tobytes() == recorded.arrays("/deputy1/thrust")["force"].tobytes()
+    assert not {topic for topic, _ in said} & {topic for topic, _ in outputs if topic != "/events"}
+
+
+def test_a_changed_replay_differs_where_it_was_changed_and_only_there(
+    flown: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    changed = tmp_path / "changed.yaml"
+    changed.write_text("/**/controller: {ros__parameters: {algorithm: coast}}\n")
+    status, again = replayed(flown, tmp_path / "again", "--params", str(changed))
+    assert status == 0
+    differing = [difference.topic for difference in identical(Bag(flown), again, gnc_topics(again))]
+    assert differing == ["/deputy1/status", "/deputy1/thrust"]
+    assert not again.arrays("/deputy1/thrust")["force"].any(), "coasting commands nothing"
+
+
+def test_replay_refuses_what_it_cannot_fly(
+    flown: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    wrong = tmp_path / "wrong.yaml"
+    wrong.write_text("/**/controller: {ros__parameters: {algorithm: magic}}\n")
+    for arguments, said in (
+        (["--nodes", "plant"], "nodes plant: must be some of navigation, guidance, controller"),
+        (["--params", str(wrong)], "/deputy1/controller: parameter algorithm: 'magic' is not allowed"),
+        (["--params", str(tmp_path / "missing.yaml")], "missing.yaml"),
+        (["--bag", str(tmp_path)], "exists already"),
+    ):
+        assert main(["replay", str(flown), "--bag", str(tmp_path / "no"), *arguments]) == 2
+        assert said in capsys.readouterr().err
