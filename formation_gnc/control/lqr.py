@@ -140,7 +140,8 @@ class LinearQuadraticRegulator(Controller):
     def _design(self, parameters: LqrParameters, model: RelativeModel, weights: Weights) -> None:
         """Set `gain` (3, n), or the table `gains` (N, 3, n) at intervals of `interval` s."""
         tick = self.tick
-        self.gains = np.empty((0, 3, 6))
+        self.gain: Matrix
+        self.gains: Matrix = np.empty((0, 3, 6))
         self.interval = tick
         self._finite = parameters.gain == "finite"
         if not model.is_time_invariant:

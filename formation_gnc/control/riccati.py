@@ -167,8 +167,8 @@ class Weights:
         it."""
         scaled_phi, scaled_gamma = self.step(phi, gamma)
         reach = scaled_gamma.T @ cost_to_go
-        gain: Matrix = np.linalg.solve(self.input + reach @ scaled_gamma, reach @ scaled_phi)
-        return gain * np.outer(self.input_unit, 1.0 / self.state_unit)
+        gain = np.linalg.solve(self.input + reach @ scaled_gamma, reach @ scaled_phi)
+        return np.asarray(gain, dtype=np.float64) * np.outer(self.input_unit, 1.0 / self.state_unit)
 
 
 def stationary_gain(phi: Matrix, gamma: Matrix, weights: Weights) -> Matrix:
