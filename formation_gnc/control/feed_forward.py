@@ -55,6 +55,6 @@ class FeedForward:
         """(3, 3) inverse of what a held acceleration does to the velocity; Hill's axes turn little
         meanwhile."""
         if self._inverse[0] != ahead:
-            effect = np.linalg.inv(self._model.discretise(0.0, ahead)[1][3:])
-            self._inverse = ahead, np.asarray(effect, dtype=np.float64)
+            inverse = np.linalg.inv(self._model.discretise(0.0, ahead)[1][3:])
+            self._inverse = ahead, np.asarray(inverse, dtype=np.float64)
         return self._inverse[1]

@@ -1,208 +1,104 @@
-import itertools
-import math
+"""Sensors of the plant: each with errors of its own, of the size it was given."""
+
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from numpy.typing import NDArray
-from scipy.stats import kstest
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.interface import NANOSECONDS, Sensor
-from formation_gnc.orbit.constants import MU
 from formation_gnc.orbit.elements import Elements, state_from_elements
-from formation_gnc.parameters import load
-from formation_gnc.plant.sensors import Sensors, SensorSuite, read
+from formation_gnc.plant.sensors import SensorParameters, Sensors, SensorSuite, read
 
-Array = NDArray[np.float64]
+CHIEF = state_from_elements(Elements(7e6, 0.01, 0.9, 0.3, 0.2, 0.1))
+DEPUTY = CHIEF + np.array([100.0, -200.0, 50.0, 0.1, 0.2, -0.3])
 
-COUNT = 4000
-"""Readings that a statistic is taken over: its own scatter is 1 / sqrt(COUNT) = 1.6 %."""
-FIVE_SIGMA = 5.0 / math.sqrt(COUNT)
-
-CHIEF = np.array([7.0e6, 0.0, 0.0, 0.0, 1000.0, 7400.0])
-DEPUTY = np.array([-2.0e6, 5.0e6, 4.0e6, -6000.0, -3000.0, 2500.0])
-ALL_ON = {f"{sensor.name.lower()}.on": True for sensor in Sensor}
-EVERY_TICK = {f"{sensor.name.lower()}.interval": 1.0 for sensor in Sensor}
-SIGMA = {Sensor.RADIUS: 5.0, Sensor.RANGE_RATE: 0.01, Sensor.LATITUDE: 1e-6}
-SIGMA |= {Sensor.RIGHT_ASCENSION: 1e-6, Sensor.CHIEF_RANGE: 1.0}
+Delivered = dict[int, list[tuple[int, float, float]]]
 
 
-def sensors(seed: int = 1, deputy: str = "deputy1", **values: Any) -> Sensors:
-    named = {name.replace("__", "."): value for name, value in values.items()}
-    return Sensors(load(SensorSuite, ALL_ON | EVERY_TICK | named), NANOSECONDS, seed, deputy)
+def flown(ticks: int = 4000, seed: int = 1, tick: float = 1.0, **changes: Any) -> Delivered:
+    """What arrived in a flight that stands still: tick, value and age of every reading by sensor."""
+    sensors = Sensors(SensorSuite(**changes), round(tick * NANOSECONDS), seed, "deputy1")
+    arrived: Delivered = {int(sensor): [] for sensor in Sensor}
+    for number in range(ticks):
+        for sensor, value, age in zip(*sensors.readings(number, DEPUTY, CHIEF), strict=True):
+            arrived[sensor].append((number, value, age))
+    return arrived
 
 
-def errors(suite: Sensors, ticks: int = COUNT) -> dict[Sensor, Array]:
-    """Readings minus truth of every sensor, over ticks in order, one state throughout."""
-    found: dict[Sensor, list[float]] = {}
-    for tick in range(ticks):
-        kinds, values, _ = suite.readings(tick, DEPUTY, CHIEF)
-        for kind, value in zip(kinds, values, strict=True):
-            found.setdefault(Sensor(kind), []).append(value - read(Sensor(kind), DEPUTY, CHIEF))
-    return {kind: np.array(values) for kind, values in found.items()}
+def errors(delivered: Delivered, sensor: Sensor) -> np.ndarray:
+    return np.array([value for _, value, _ in delivered[sensor]]) - read(sensor, DEPUTY, CHIEF)
 
 
-orbits = st.builds(
-    Elements,
-    semi_major_axis=st.floats(8e6, 4e7),
-    eccentricity=st.floats(0.0, 0.15),
-    inclination=st.floats(0.0, math.pi),
-    right_ascension=st.floats(-3.0, 3.0),
-    argument_of_perigee=st.floats(-3.0, 3.0),
-    true_anomaly=st.floats(-3.0, 3.0),
-)
+def test_noise_and_bias_are_those_asked_for() -> None:
+    model = SensorParameters(sigma=5.0, bias=3.0, interval=1.0)
+    error = errors(flown(radius=model), Sensor.RADIUS)
+    # 4000 samples: the mean is known to 0.08, the deviation to 0.056; four of these
+    assert error.mean() == pytest.approx(3.0, abs=0.32)
+    assert error.std() == pytest.approx(5.0, abs=0.23)
 
 
-@given(orbits, st.floats(-math.pi, math.pi))
-def test_readings_follow_from_the_elements_of_the_orbit(orbit: Elements, turn: float) -> None:
-    state = state_from_elements(orbit)
-    parameter = orbit.semi_major_axis * (1.0 - orbit.eccentricity**2)
-    radius = parameter / (1.0 + orbit.eccentricity * math.cos(orbit.true_anomaly))
-    rate = math.sqrt(MU / parameter) * orbit.eccentricity * math.sin(orbit.true_anomaly)
-    argument = orbit.argument_of_perigee + orbit.true_anomaly
-    sine = math.sin(orbit.inclination) * math.sin(argument)
-    assert read(Sensor.RADIUS, state, CHIEF) == pytest.approx(radius, rel=1e-14)
-    assert read(Sensor.RANGE_RATE, state, CHIEF) == pytest.approx(rate, abs=1e-11)  # rounding at 1e4 m/s
-    assert math.sin(read(Sensor.LATITUDE, state, CHIEF)) == pytest.approx(sine, abs=1e-14)
-    node = orbit.right_ascension
-    east = math.atan2(math.cos(orbit.inclination) * math.sin(argument), math.cos(argument)) + node
-    if abs(sine) < 0.999:
-        off = read(Sensor.RIGHT_ASCENSION, state, CHIEF) - east
-        assert math.remainder(off, 2.0 * math.pi) == pytest.approx(0.0, abs=1e-13 / (1.0 - sine**2))
-    c, s = math.cos(turn), math.sin(turn)
-    about_axis = np.kron(np.eye(2), [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    for sensor in (Sensor.RADIUS, Sensor.RANGE_RATE, Sensor.LATITUDE):  # none of them sees such a turn
-        here, there = read(sensor, state, CHIEF), read(sensor, about_axis @ state, CHIEF)
-        assert there == pytest.approx(here, rel=1e-14, abs=1e-11)
-
-
-@given(orbits, orbits)
-def test_the_range_to_the_chief_is_the_same_from_either_end(one: Elements, other: Elements) -> None:
-    deputy, chief = state_from_elements(one), state_from_elements(other)
-    distance = read(Sensor.CHIEF_RANGE, deputy, chief)
-    assert distance == read(Sensor.CHIEF_RANGE, chief, deputy)
-    assert distance == pytest.approx(float(np.linalg.norm(deputy[:3] - chief[:3])), rel=1e-14)
-
-
-@pytest.mark.parametrize("sensor", list(Sensor))
-def test_noise_is_white_normal_and_of_the_stated_size(sensor: Sensor) -> None:
-    noise = errors(sensors())[sensor] / SIGMA[sensor]
-    # the reading's own rounding is below 1e-3 of the noise of every sensor
-    assert abs(noise.mean()) < FIVE_SIGMA
-    assert abs(noise.std() - 1.0) < FIVE_SIGMA / math.sqrt(2.0)
-    assert kstest(noise, "norm").pvalue > 1e-4
-    for lag in range(1, 6):
-        assert abs(np.corrcoef(noise[lag:], noise[:-lag])[0, 1]) < FIVE_SIGMA
-
-
-def test_sensors_and_deputies_err_independently_of_one_another() -> None:
-    streams = [*errors(sensors()).values(), *errors(sensors(deputy="deputy2")).values()]
-    assert len(streams) == 2 * len(Sensor)
-    for one, other in itertools.combinations(streams, 2):
-        assert abs(np.corrcoef(one, other)[0, 1]) < FIVE_SIGMA
-
-
-def test_the_same_seed_gives_the_same_bits_and_another_seed_others() -> None:
-    first, again, other = (errors(sensors(seed), 50) for seed in (7, 7, 8))
-    for sensor in Sensor:
-        assert first[sensor].tolist() == again[sensor].tolist()
-        assert not np.isin(first[sensor], other[sensor]).any()
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"latitude__on": False},
-        {"latitude__sigma": 1.0},
-        {"latitude__interval": 3.0},
-        {"latitude__dropout": 0.5, "latitude__outlier": 0.5},
-        {"latitude__latency": 4.0},
-    ],
-)
-def test_what_is_set_for_one_sensor_changes_nothing_for_another(change: dict[str, Any]) -> None:
-    before, after = errors(sensors(), 100), errors(sensors(**change), 100)
-    for sensor in set(Sensor) - {Sensor.LATITUDE}:
-        assert before[sensor].tolist() == after[sensor].tolist()
-
-
-def test_fixes_and_readings_do_not_change_one_another() -> None:
-    quiet, busy = sensors(), sensors()
-    for tick in range(30):
-        busy.fix(np.zeros(6))
-        assert quiet.readings(tick, DEPUTY, CHIEF) == busy.readings(tick, DEPUTY, CHIEF)
-    fresh = sensors()
-    fixes = [fresh.fix(np.zeros(6)).tolist() for _ in range(3)]
-    late = sensors()
-    errors(late, 10)
-    assert [late.fix(np.zeros(6)).tolist() for _ in range(3)] == fixes
-
-
-def test_a_fix_errs_by_what_is_stated_on_every_axis() -> None:
-    suite = sensors(fix_position_sigma=2.0, fix_velocity_sigma=0.003)
-    truth = np.array([1.0, -2.0, 3.0, 0.1, 0.2, -0.3])
-    noise = (np.array([suite.fix(truth) for _ in range(COUNT)]) - truth) / np.repeat([2.0, 0.003], 3)
-    assert np.abs(noise.mean(axis=0)).max() < FIVE_SIGMA
-    assert np.abs(noise.std(axis=0) - 1.0).max() < FIVE_SIGMA / math.sqrt(2.0)
-    assert np.abs(np.corrcoef(noise.T) - np.eye(6)).max() < FIVE_SIGMA
-
-
-def test_without_noise_the_reading_is_the_truth() -> None:
-    silent = sensors(**{f"{sensor.name.lower()}__sigma": 0.0 for sensor in Sensor})
-    assert all(not found.any() for found in errors(silent, 20).values())
-
-
-def test_a_bias_is_added_to_every_reading() -> None:
-    plain, biased = (
-        errors(sensors(), 50)[Sensor.RADIUS],
-        errors(sensors(radius__bias=-7.0), 50)[Sensor.RADIUS],
+def test_only_what_is_on_reads_and_each_at_its_interval() -> None:
+    arrived = flown(
+        100, latitude=SensorParameters(sigma=1e-6, interval=7.0), range_rate=SensorParameters(on=False)
     )
-    assert biased - plain == pytest.approx(-7.0, abs=1e-8)  # rounding of the radius
+    assert [tick for tick, _, _ in arrived[Sensor.RADIUS]] == list(range(0, 100, 10))
+    assert [tick for tick, _, _ in arrived[Sensor.LATITUDE]] == list(range(0, 100, 7))
+    assert not arrived[Sensor.RANGE_RATE]
+    assert not arrived[Sensor.RIGHT_ASCENSION]
 
 
-@pytest.mark.parametrize("late", [0, 3])
-def test_a_reading_comes_at_its_interval_and_as_late_as_stated(late: int) -> None:
-    suite = sensors(radius__interval=4.0, radius__latency=float(late), latitude__on=False, radius__sigma=0.0)
-    for tick in range(40):
-        state = DEPUTY * (1.0 + 1e-3 * tick)
-        kinds, values, ages = suite.readings(tick, state, CHIEF)
-        assert int(Sensor.LATITUDE) not in kinds
-        if tick >= late and (tick - late) % 4 == 0:
-            place = kinds.index(int(Sensor.RADIUS))
-            taken = DEPUTY * (1.0 + 1e-3 * (tick - late))
-            assert (values[place], ages[place]) == (read(Sensor.RADIUS, taken, CHIEF), float(late))
-        else:
-            assert int(Sensor.RADIUS) not in kinds
+def test_latency_delivers_what_was_read_then_with_its_age() -> None:
+    plain = flown(100)
+    late = flown(100, radius=SensorParameters(sigma=5.0, latency=25.0))
+    assert [(tick + 25, value) for tick, value, _ in plain[Sensor.RADIUS]][:8] == [
+        (tick, value) for tick, value, _ in late[Sensor.RADIUS]
+    ]
+    assert {age for _, _, age in late[Sensor.RADIUS]} == {25.0}
 
 
-def test_dropouts_and_outliers_come_as_often_as_stated_and_the_rest_is_as_without_them() -> None:
-    clean = errors(sensors())[Sensor.RADIUS]
-    dropped = errors(sensors(radius__dropout=0.3))[Sensor.RADIUS]
-    spread = math.sqrt(0.3 * 0.7 / COUNT)
-    assert abs(1.0 - len(dropped) / COUNT - 0.3) < 5.0 * spread
-    assert np.isin(dropped, clean).all()
-    strays = errors(sensors(radius__outlier=0.1, radius__outlier_size=40.0))[Sensor.RADIUS]
-    shift = (strays - clean) / 5.0
-    hit = np.abs(shift) > 1.0
-    assert abs(hit.mean() - 0.1) < 5.0 * math.sqrt(0.1 * 0.9 / COUNT)
-    assert np.abs(shift[hit]) == pytest.approx(40.0)
-    assert abs(np.sign(shift[hit]).mean()) < 5.0 / math.sqrt(hit.sum())
-    assert strays[~hit].tolist() == clean[~hit].tolist()
+def test_dropouts_leave_the_other_readings_as_they_were() -> None:
+    plain, gaps = flown(), flown(radius=SensorParameters(sigma=5.0, dropout=0.3))
+    kept = set(gaps[Sensor.RADIUS])
+    assert kept < set(plain[Sensor.RADIUS])
+    assert len(kept) / len(plain[Sensor.RADIUS]) == pytest.approx(0.7, abs=0.1)  # of 400: four sigma
+    assert gaps[Sensor.LATITUDE] == plain[Sensor.LATITUDE]
 
 
-def test_in_an_outage_nothing_is_read_and_afterwards_all_is_as_without_it() -> None:
-    whole, gap = sensors(), sensors(outage_start=10.0, outage_duration=5.0)
-    for tick in range(30):
-        expected, found = whole.readings(tick, DEPUTY, CHIEF), gap.readings(tick, DEPUTY, CHIEF)
-        assert found == (([], [], []) if 10 <= tick < 15 else expected)
+def test_outliers_are_as_frequent_and_as_large_as_asked_for() -> None:
+    model = SensorParameters(sigma=5.0, interval=1.0, outlier=0.01, outlier_size=50.0)
+    error = errors(flown(radius=model), Sensor.RADIUS)
+    wild = np.abs(error) > 125.0
+    assert wild.mean() == pytest.approx(0.01, abs=0.0065)
+    assert np.abs(error[wild]).mean() == pytest.approx(250.0, abs=5.0)
+    assert {-1.0, 1.0} == set(np.sign(error[wild]))
 
 
-@pytest.mark.parametrize("name", ["radius.interval", "chief_range.latency"])
-def test_an_interval_and_a_latency_are_whole_ticks(name: str) -> None:
-    with pytest.raises(ConfigurationError) as refusal:
-        sensors(**{name.replace(".", "__"): 2.5})
-    assert str(refusal.value) == (
-        f"parameter deputy1.sensors.{name}: 2.5 s is not allowed; it must be a whole number of ticks of 1 s"
-    )
+def test_an_outage_silences_everything_for_its_time() -> None:
+    arrived = flown(1000, outage_start=200.0, outage_duration=300.0)
+    for sensor in (Sensor.RADIUS, Sensor.RANGE_RATE, Sensor.LATITUDE):
+        ticks = np.array([tick for tick, _, _ in arrived[sensor]])
+        assert not ((ticks >= 200) & (ticks < 500)).any()
+        assert len(ticks) == 70
+
+
+def test_a_sensor_more_changes_nothing_about_the_others() -> None:
+    plain = flown()
+    more = flown(right_ascension=SensorParameters(sigma=1e-6), chief_range=SensorParameters(sigma=1.0))
+    assert more[Sensor.RIGHT_ASCENSION]
+    for sensor in (Sensor.RADIUS, Sensor.RANGE_RATE, Sensor.LATITUDE):
+        assert more[sensor] == plain[sensor]
+    distance = np.mean([value for _, value, _ in more[Sensor.CHIEF_RANGE]])
+    assert distance == pytest.approx(np.linalg.norm(DEPUTY[:3] - CHIEF[:3]), abs=0.2)  # 400 samples of 1 m
+
+
+def test_the_errors_of_different_sensors_are_independent() -> None:
+    delivered = flown(20000)
+    one, other = errors(delivered, Sensor.RADIUS), errors(delivered, Sensor.LATITUDE)
+    assert abs(np.corrcoef(one, other)[0, 1]) < 0.09  # of 2000: four sigma
+
+
+@pytest.mark.parametrize("name", ["interval", "latency"])
+def test_what_is_not_whole_ticks_is_refused_by_name(name: str) -> None:
+    with pytest.raises(ConfigurationError, match=rf"deputy1\.sensors\.latitude\.{name}.*0\.5"):
+        flown(1, latitude=SensorParameters(**{name: 0.5}))
