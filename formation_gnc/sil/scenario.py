@@ -13,7 +13,7 @@ import yaml
 import formation_gnc
 from formation_gnc.control.autopilot import ControllerParameters
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.guidance.guide import GuidanceParameters
+from formation_gnc.guidance.guide import GuidanceParameters, check_places
 from formation_gnc.navigation.navigator import NavigationParameters
 from formation_gnc.parameters import dump, load, read_yaml
 from formation_gnc.plant.plant import PlantParameters
@@ -87,6 +87,7 @@ def load_scenario(name: str, overrides: Mapping[str, Mapping[str, Any]] | None =
             )
             for deputy in plant.deputies
         }
+        check_places({name: setup.guidance for name, setup in deputies.items()})
     except ConfigurationError as error:
         raise ConfigurationError(f"{path.name}: {error}") from None
     return Scenario(path.stem, plant, deputies)

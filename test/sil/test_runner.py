@@ -191,6 +191,7 @@ def test_the_flight_is_the_recorded_one(flight: Records) -> None:
 
 
 TWO = {"deputies": ["deputy1", "deputy2"], "deputy2.relative_state": [0.0, 80.0, 0.0, 0.0, 0.0, 0.0]}
+TWO_PLACES = {"/plant": TWO, "/deputy2/guidance": {"slot": 1}}
 
 
 def test_the_same_seed_gives_the_same_bits() -> None:
@@ -214,7 +215,7 @@ def test_records_do_not_change_after_they_were_handed_over() -> None:
 
 
 def test_another_deputy_changes_nothing_for_the_first() -> None:
-    alone, together = all_bits(fly(ticks=100)[1]), all_bits(fly({"/plant": TWO}, ticks=100)[1])
+    alone, together = all_bits(fly(ticks=100)[1]), all_bits(fly(TWO_PLACES, ticks=100)[1])
     for name in ("measurement", *LOOP):
         assert alone[f"/deputy1/{name}"] == together[f"/deputy1/{name}"]
         assert len(together[f"/deputy2/{name}"]) == 100
