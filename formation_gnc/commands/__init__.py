@@ -1,11 +1,12 @@
 """Subcommands of `formation-gnc`, one module each: a docstring for its help, `add_arguments` and `run`."""
 
-from formation_gnc.commands import compare, navigate, recover, replay, sil
+from formation_gnc.commands import compare, navigate, recover, replay, report, sil
 
 COMMANDS = {
     "sil": sil,
     "navigate": navigate,
     "replay": replay,
     "compare": compare,
+    "report": report,
     "recover": recover,
 }

@@ -3,7 +3,7 @@
 import heapq
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import groupby, zip_longest
+from itertools import groupby, islice, zip_longest
 from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -109,7 +109,15 @@ class Bag:
         "stamp_ns" is the stamp (int64, ns) and "time" the same in s; then every field of the message,
         nested ones dotted and fixed arrays stacked, as MessageType.arrays has them.
         """
-        rows = [(data, stamp) for _, data, stamp in self.messages([topic])]
+        return self._as_arrays(topic, [(data, stamp) for _, data, stamp in self.messages([topic])])
+
+    def batches(self, topic: str, size: int = 8192) -> Iterator[dict[str, NDArray[Any]]]:
+        """All messages of a topic as `arrays` has them, so many at a time: for bags of any length."""
+        rows = ((data, stamp) for _, data, stamp in self.messages([topic]))
+        while batch := list(islice(rows, size)):
+            yield self._as_arrays(topic, batch)
+
+    def _as_arrays(self, topic: str, rows: list[tuple[bytes, int]]) -> dict[str, NDArray[Any]]:
         stamps = np.array([stamp for _, stamp in rows], dtype=np.int64)
         fields = self._type(topic).arrays([data for data, _ in rows])
         return {"stamp_ns": stamps, "time": stamps * 1e-9, **fields}

@@ -1,0 +1,102 @@
+"""The report page: what is in it, how large it may get, and that a browser shows it."""
+
+import math
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from formation_gnc.analysis.metrics import figures
+from formation_gnc.analysis.report import POINTS, _Thinned, write_report
+from formation_gnc.nodes.record_in_process import InProcessRecorder
+from formation_gnc.recording.reader import Bag
+from formation_gnc.recording.writer import BagWriter
+from formation_gnc.sil.runner import Run
+from formation_gnc.sil.scenario import load_scenario
+
+BROWSER = shutil.which("chromium")
+
+
+def fly(directory: Path, duration: float) -> Bag:
+    overrides = {
+        "/plant": {"duration": duration},
+        "/**/controller": {"schedule": ["{at: 100.0, algorithm: coast}"]},
+    }
+    with BagWriter(directory, {"run": {"name": "<b>bold</b>"}}) as writer:
+        Run(load_scenario("leader_follower", overrides)).fly(InProcessRecorder(writer))
+    return Bag(directory)
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Bag:
+    return fly(tmp_path_factory.mktemp("report") / "bag", 300.0)
+
+
+@pytest.fixture(scope="module")
+def page(bag: Bag) -> Path:
+    return write_report(bag, bag.path / "report.html", "a <title>")
+
+
+def test_the_page_is_self_contained_and_says_what_was_flown(page: Path, bag: Bag) -> None:
+    text = page.read_text()
+    assert not re.findall(r'<(?:script|link|img)[^>]+(?:src|href)=["\']https?:', text), (
+        "nothing from the network"
+    )
+    assert "algorithm: lqr -&gt; coast" in text
+    assert "a &lt;title&gt;" in text
+    assert "&lt;b&gt;bold&lt;/b&gt;" in text, "what a bag says is text, never markup"
+    spent = 1e3 * figures(bag).deputies["deputy1"].delta_v_m_s
+    (said,) = re.findall(r"delta-v of deputy1</th><td>([\d.]+) mm/s", text)
+    assert float(said) == pytest.approx(spent, abs=0.0006), "summed over every tick, not over the drawn ones"
+
+
+def test_a_curve_never_has_more_than_twice_the_points_and_keeps_even_steps() -> None:
+    thinned = _Thinned(1)
+    for start in range(0, 50_000, 777):
+        thinned.add(np.arange(start, start + 777, dtype=float)[:, None])
+        assert len(thinned.rows) <= 2 * POINTS
+    steps = np.unique(np.diff(thinned.rows[:, 0]))
+    assert len(steps) == 1
+    assert math.log2(steps[0]).is_integer()
+
+
+@pytest.mark.skipif(BROWSER is None, reason="chromium is not installed")
+def test_a_browser_shows_the_page_without_errors_and_its_slider_moves_the_deputy(page: Path) -> None:
+    # what the page does is written into its title, which the dumped document shows
+    probe = page.with_name("probe.html")
+    script = """<script>window.addEventListener('load', () => setTimeout(() => {
+      const all = document.querySelectorAll('.js-plotly-plot'), first = all[0];
+      const steps = first.layout.sliders[0].steps, drawn = first.querySelector('canvas') !== null;
+      const moving = first.data.length - 1, before = first.data[moving].y[0];
+      Plotly.animate(first, ...steps[steps.length - 1].args);
+      Plotly.restyle(all[1], {visible: 'legendonly'}, [0]);
+      setTimeout(() => {
+        const moved = first.data[moving].y[0] !== before && drawn, hidden = all[1].data[0].visible;
+        document.title = `plots ${all.length} steps ${steps.length} moved ${moved} hidden ${hidden}`;
+      }, 2000);
+    }, 1000));</script></body>"""
+    probe.write_text(page.read_text().replace("</body>", script))
+    flags = ["--headless", "--no-sandbox", "--disable-gpu", "--use-gl=angle", "--use-angle=swiftshader"]
+    flags += [
+        "--enable-unsafe-swiftshader",
+        "--enable-logging=stderr",
+        "--v=0",
+        "--virtual-time-budget=60000",
+    ]
+    result = subprocess.run(
+        [str(BROWSER), *flags, f"--user-data-dir={page.parent / 'profile'}", "--dump-dom", probe.as_uri()],
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=True,
+    )
+    said = [line for line in result.stderr.splitlines() if ":CONSOLE" in line]
+    wrong = [line for line in said if ":INFO:CONSOLE" not in line or "Uncaught" in line]
+    assert not wrong
+    assert "slider-container" in result.stdout
+    title = re.search(r"<title>plots (\d+) steps (\d+) moved (\w+) hidden (\w+)</title>", result.stdout)
+    assert title is not None, said
+    assert title.groups() == ("3", "120", "true", "legendonly")
