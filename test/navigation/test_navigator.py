@@ -589,3 +589,46 @@ def test_a_satellite_above_the_pole_is_told_that_latitude_has_no_direction_there
 def test_parameters_that_make_no_covariance_are_refused(changes: dict[str, Any]) -> None:
     with pytest.raises(ConfigurationError, match=next(iter(changes))):
         load(NavigationParameters, {"chief.semi_major_axis": 7e6, **changes})
+
+
+def test_a_fix_at_hand_when_the_filter_diverges_is_taken() -> None:
+    setup = parameters(tick=10.0)
+    samples = list(fly(setup, 30, np.random.default_rng(25)))
+    samples[0].measurement.fix[:] += [1000.0, 0.0, 1000.0, 1.0, 0.0, 0.0]
+    stream = [
+        changed(sample, fix_available=True, fix=sample.truth + 0.1) if index == 4 else sample
+        for index, sample in enumerate(samples)
+    ]  # the fifth update in which the gates refuse everything
+    estimates = run(navigator(setup), stream)
+    assert [each.status for each in estimates].count(EstimateStatus.ACQUIRED) == 2
+    assert estimates[4].status == EstimateStatus.ACQUIRED
+    assert estimates[4].sensor == samples[4].measurement.sensor
+    assert nees(estimates[-1], samples[-1].truth) < chi2.isf(1e-4, 6)
+
+
+def test_a_faulty_sensor_alone_is_no_divergence() -> None:
+    setup = parameters(tick=10.0)
+    stream = [
+        changed(sample, reading=[sample.measurement.reading[0] + 500.0, *sample.measurement.reading[1:]])
+        for sample in fly(setup, 200, np.random.default_rng(26))
+    ]
+    estimates = run(navigator(setup), stream)
+    assert estimates[-1].refusals[Refusal.GATE] == 200
+    assert {each.status for each in estimates[1:]} == {EstimateStatus.TRACKING}
+
+
+def test_the_filter_is_the_same_whatever_came_with_a_reading_it_does_not_use() -> None:
+    setup = parameters(tick=10.0)
+    samples = list(fly(replace(setup, sensors=(*THREE, "chief_range")), 50, np.random.default_rng(27)))
+    bare = [
+        changed(
+            sample,
+            sensor=sample.measurement.sensor[:3],
+            reading=sample.measurement.reading[:3],
+            age=sample.measurement.age[:3],
+        )
+        for sample in samples
+    ]
+    one, other = run(navigator(setup), samples)[-1], run(navigator(setup), bare)[-1]
+    assert one.covariance.tobytes() == other.covariance.tobytes()
+    assert one.refusals.sum() == 0
