@@ -3,7 +3,7 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 NAME = "formation_gnc"
-NODES = ["plant", "navigation", "guidance", "controller", "recorder"]
+NODES = ["plant", "navigation", "guidance", "controller", "recorder", "replay"]
 
 setup(
     name=NAME,

@@ -1,17 +1,23 @@
 """What the node graph recorded, flown again."""
 
+import signal
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
+import rclpy
 import yaml
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from std_srvs.srv import SetBool, Trigger
 
 from formation_gnc.analysis.compare import gnc_topics
 from formation_gnc.cli import main
 from formation_gnc.recording.reader import Bag, identical
 from formation_gnc.sil.scenario import find_scenario
 
-from .conftest import Sil
+from .conftest import GNC_TOPICS, PARTS, PATIENCE, Desk, Sil, wait_until
 
 pytestmark = pytest.mark.sil
 
@@ -30,3 +36,64 @@ def test_an_unchanged_replay_of_a_graph_run_gives_the_recorded_bits(
     assert list(again.arrays("/events")["kind"]).count("parameters") == 2
     assert again.topics["/deputy1/timing"].count == 900, "of every part at every tick"
     assert identical(recorded, again, gnc_topics(recorded)) == []
+
+
+def call(user: Any, executor: SingleThreadedExecutor, kind: Any, service: str, request: Any) -> Any:
+    client = user.create_client(kind, service)
+    assert client.wait_for_service(timeout_sec=PATIENCE)
+    answer = client.call_async(request)
+    executor.spin_until_future_complete(answer, timeout_sec=PATIENCE)
+    return answer.result()
+
+
+def test_the_replay_node_plays_in_step_with_real_nodes_to_the_same_bits(
+    desk: Desk, sil: Callable[..., Sil]
+) -> None:
+    run = sil("--duration", "200", "--in-process")
+    assert run.finish()[0] == 0
+    bag = desk.directory / "again"
+    recorder = desk.start("recorder", bag=bag)
+    parts = [desk.start(kind) for kind in PARTS]
+    player = desk.start("replay", bag=run.bag, paused=True)
+    context = Context()
+    rclpy.init(context=context, domain_id=desk.domain)
+    user = rclpy.create_node("user", context=context)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(user)
+    heard = {"measurement": 2, "estimate": 3, "target": 2, "thrust": 2, "status": 1}
+    try:
+        wait_until(
+            lambda: all(user.count_subscribers(f"/deputy1/{each}") >= n for each, n in heard.items()),
+            "everybody to listen",
+        )
+        step = call(user, executor, Trigger, "/replay/step", Trigger.Request())
+        assert step.success
+        assert step.message == "played 0 s"
+        assert (
+            call(user, executor, SetBool, "/replay/pause", SetBool.Request(data=False)).message == "playing"
+        )
+    finally:
+        user.destroy_node()
+        rclpy.shutdown(context=context)
+    assert player.wait() == 0, player.text
+    for terminal in (*parts, recorder):
+        terminal.signal(signal.SIGINT)
+        assert terminal.wait() == 0, terminal.text
+    assert identical(Bag(run.bag), Bag(bag), GNC_TOPICS) == []
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [
+        ({}, "parameter bag: missing"),
+        ({"bag": "/nowhere"}, "/nowhere"),
+        ({"bag": ".", "start": 5.0, "end": 5.0}, "parameter end: 5.0 is not allowed; it must be above start"),
+    ],
+)
+def test_the_replay_node_refuses_what_it_cannot_play(
+    desk: Desk, parameters: dict[str, object], said: str
+) -> None:
+    terminal = desk.start("replay", **parameters)
+    assert terminal.wait() == 2
+    (line,) = [line for line in terminal.text.splitlines() if line.strip()]
+    assert said in line

@@ -1,0 +1,190 @@
+"""The replay node: plays recorded topics with `/clock`, in step with those who answer, or paced."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import import_module
+from time import monotonic
+from typing import Any
+
+from formation_gnc_msgs.msg import Thrust as ThrustMessage
+from rclpy.task import Future
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import SetBool, Trigger
+
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.interface import NANOSECONDS
+from formation_gnc.mission import Mission, Orbit
+from formation_gnc.nodes import topics
+from formation_gnc.nodes.conversion import stamp
+from formation_gnc.nodes.shell import STOP, ConfiguredNode, run
+from formation_gnc.parameters import parameter
+from formation_gnc.recording.reader import Bag
+
+BURST = 50
+"""Ticks played at most before services are looked after again."""
+
+CHECK_PERIOD = 0.002
+"""Wall time (s) between looks at pace and patience."""
+
+ANY_ORBIT = Orbit(7e6)
+"""Every scenario's file tells every node of the chief; nothing here depends on it."""
+
+
+@dataclass(frozen=True)
+class ReplayParameters(Mission):
+    """What to play, and how fast."""
+
+    chief: Orbit = ANY_ORBIT
+    bag: str = parameter("", doc="bag to play")
+    topics: tuple[str, ...] = parameter((), doc="topics to play; empty for the truth and all measurements")
+    start: float = parameter(0.0, unit="s", minimum=0.0, doc="simulated time to play from")
+    end: float = parameter(2.0**31, unit="s", above=0.0, doc="simulated time to play to, itself left out")
+    rate: float = parameter(0.0, minimum=0.0, doc="simulated seconds per wall second at most; 0: no limit")
+    loop: bool = parameter(False, doc="begin again at the end")
+    paused: bool = parameter(False, doc="wait for the pause service to go, or for the step service")
+    patience: float = parameter(
+        5.0,
+        unit="s",
+        above=0.0,
+        doc="wall time to wait for an answer that was recorded and that a node can give",
+    )
+
+
+class ReplayNode(ConfiguredNode):
+    """Publishes all that was recorded of a stamp, waits for the thrust of those who answer, and goes on.
+
+    Who answers is whoever publishes the thrust of a deputy whose measurement is played; nobody is waited for
+    on a tick that had no answer when it was recorded.
+    """
+
+    def __init__(self) -> None:
+        """Open the bag; raises ConfigurationError when it cannot be played."""
+        super().__init__("replay", ReplayParameters)
+        if not self.values.bag:
+            raise ConfigurationError("parameter bag: missing; give a bag to play")
+        if not self.values.start < self.values.end:
+            raise ConfigurationError(
+                f"parameter end: {self.values.end} is not allowed; "
+                f"it must be above start, {self.values.start}"
+            )
+        self.bag = Bag(self.values.bag)
+        measured = [topic for topic in self.bag.topics if topic.endswith(f"/{topics.MEASUREMENT}")]
+        default = [*measured, *(topic for topic in self.bag.topics if topic == topics.TRUTH)]
+        names = [name for name in self.values.topics or default if name != topics.CLOCK]
+        self._played = {
+            name: self.create_publisher(self._type(name), name, topics.quality()) for name in names
+        }
+        self._tell_time = self.create_publisher(Clock, topics.CLOCK, topics.quality())
+        self._answers = {
+            name.replace(topics.MEASUREMENT, topics.THRUST) for name in names if name in measured
+        } & self.bag.topics.keys() - self._played.keys()
+        for name in sorted(self._answers):
+            self.create_subscription(
+                ThrustMessage,
+                name,
+                lambda message, name=name: self._on_thrust(name, message),
+                topics.quality(topics.LATEST),
+            )
+        self.create_service(SetBool, "~/pause", self._on_pause)
+        self.create_service(Trigger, "~/step", self._on_step)
+        self.done = Future()
+        self._paused = self.values.paused
+        self._ticks = self._read()
+        self._awaited: set[str] = set()
+        self._time: int | None = None
+        self._played_at = monotonic()
+
+    def _type(self, topic: str) -> Any:
+        if topic not in self.bag.topics:
+            raise ConfigurationError(
+                f"topic {topic}: not in the bag; it has {', '.join(sorted(self.bag.topics))}"
+            )
+        name = self.bag.topics[topic].type_name
+        try:
+            package, kind, message = name.split("/")
+            return getattr(import_module(f"{package}.{kind}"), message)
+        except (ImportError, AttributeError, ValueError):
+            raise ConfigurationError(f"topic {topic}: its type {name!r} is not installed") from None
+
+    def _read(self) -> Iterator[tuple[int, list[tuple[str, bytes]], set[str]]]:
+        """Stamp, messages to play and recorded answers of every tick, for ever when looping."""
+        wanted = sorted(self._played.keys() | self._answers)
+        first, last = round(self.values.start * NANOSECONDS), round(self.values.end * NANOSECONDS)
+        while True:
+            time, messages, answers = -1, list[tuple[str, bytes]](), set[str]()
+            any_played = False
+            for at, topic, group in self.bag.by_stamp(wanted):
+                if not first <= at < last:
+                    continue
+                if at != time and messages:
+                    yield time, messages, answers
+                if at != time:
+                    time, messages, answers = at, [], set()
+                if topic in self._played:
+                    messages += [(topic, data) for data in group]
+                    any_played = True
+                else:
+                    answers.add(topic)
+            if messages:
+                yield time, messages, answers
+            if not self.values.loop or not any_played:
+                return
+
+    def check(self) -> None:
+        """Play what is due."""
+        for _ in range(BURST):
+            if self._paused or self.done.done() or not self._is_due():
+                return
+            self._play()
+
+    def _is_due(self) -> bool:
+        waited = monotonic() - self._played_at
+        if self._awaited and waited < self.values.patience:
+            return False
+        if self._awaited:
+            self.get_logger().warning(f"no answer on {', '.join(sorted(self._awaited))}: going on")
+            self._awaited = set()
+        return self.values.rate == 0.0 or self._time is None or waited >= self.values.tick / self.values.rate
+
+    def _play(self) -> None:
+        try:
+            self._time, messages, answers = next(self._ticks)
+        except StopIteration:
+            self.done.set_result(None)
+            return
+        self._awaited = {name for name in answers if self.count_publishers(name) > 0}
+        self._played_at = monotonic()
+        for topic, data in messages:
+            self._played[topic].publish(data)
+        clock = Clock()
+        clock.clock.sec, clock.clock.nanosec = divmod(self._time, NANOSECONDS)
+        self._tell_time.publish(clock)
+
+    def _on_thrust(self, topic: str, message: Any) -> None:
+        if stamp(message) == self._time:
+            self._awaited.discard(topic)
+            self.check()
+
+    def _on_pause(self, request: Any, response: Any) -> Any:
+        self._paused = request.data
+        response.success, response.message = True, "paused" if self._paused else "playing"
+        return response
+
+    def _on_step(self, _request: Any, response: Any) -> Any:
+        response.success = self._paused and not self.done.done()
+        if response.success:
+            self._play()
+            response.message = f"played {(self._time or 0) / NANOSECONDS:g} s"
+        else:
+            response.message = "at the end" if self.done.done() else "not paused"
+        return response
+
+
+def play(node: ReplayNode) -> None:
+    """Play to the end, or until told to stop."""
+    node.spin((node.done, STOP), node.check, lambda: CHECK_PERIOD)
+
+
+def main() -> int:
+    """Run the node."""
+    return run(ReplayNode, play)
