@@ -30,7 +30,7 @@ check: setup
 test: check
 	@$(in_environment) $(pytest) --timeout 300 -m "not slow"
 
-bench: setup
+bench: .venv/.verify
 	@$(in_environment) python -m bench
 
 verify: .venv/.verify

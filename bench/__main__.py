@@ -9,10 +9,10 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from bench import graph
+from bench import control, dynamics, graph
 from bench.result import Result
 
-BENCHMARKS = {"graph": graph.run}
+BENCHMARKS = {"graph": graph.run, "dynamics": dynamics.run, "control": control.run}
 OUTPUT = Path("build/bench.json")
 
 

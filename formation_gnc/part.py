@@ -62,6 +62,10 @@ class Part[P: Schedulable, D](ABC):
         for at, changes in sorted(map(scheduled, parameters.schedule), key=lambda entry: entry[0]):
             latest = self._design_from(latest.parameters, changes)
             self._foreseen.append((at, latest))
+        self.forget()
+
+    def forget(self) -> None:  # noqa: B027 - optional
+        """Start without a memory of earlier ticks; called before the first tick of every run."""
 
     @abstractmethod
     def design(self, parameters: P) -> D:

@@ -17,16 +17,19 @@ POINTS = 4000
 
 
 def draw_overview(bag: Bag, path: Path, title: str) -> Path:
-    """Draw a row for every deputy: relative path, control error, estimation error with 3 sigma, thrust.
+    """Draw four panels for every deputy: path, control error, estimation error with 3 sigma, thrust.
 
     Returns:
         The path of the PNG file.
     """
     names = deputies_of(bag)
-    figure = Figure(figsize=(19.0, 4.6 * len(names) + 0.6), layout="constrained", dpi=100)
+    columns = 2 if len(names) == 1 else 4  # a fleet reads best with a row for each
+    rows = 4 * len(names) // columns
+    figure = Figure(figsize=(5.5 * columns, 4.4 * rows + 0.4), layout="constrained", dpi=100)
     FigureCanvasAgg(figure)
     figure.suptitle(title)
-    for row, name in zip(figure.subplots(len(names), 4, squeeze=False), names, strict=True):
+    panels = figure.subplots(rows, columns, squeeze=False).reshape(len(names), 4)
+    for row, name in zip(panels, names, strict=True):
         flown = trajectory(bag, name)
         _draw_path(row[0], flown, name)
         _draw_error(row[1], flown)
@@ -58,9 +61,12 @@ def _draw_path(axes: Any, flown: Trajectory, name: str) -> None:
 def _draw_error(axes: Any, flown: Trajectory) -> None:
     thin, hours = _thin(len(flown.time)), flown.time / 3600.0
     for axis, (label, colour) in enumerate(zip(AXES, COLOURS, strict=True)):
-        axes.plot(hours[thin], flown.error[thin, axis], color=colour, lw=1.0, label=label)
-    axes.set(xlabel="time [h]", ylabel="true position - target [m]", title="control error")
-    axes.set_yscale("symlog", linthresh=1.0)
+        axes.plot(hours[thin], np.abs(flown.error[thin, axis]), color=colour, lw=0.7, label=label)
+    distance = np.linalg.norm(flown.error[thin], axis=1)
+    axes.plot(hours[thin], distance, color="black", lw=1.5, label="distance")
+    axes.set(xlabel="time [h]", ylabel="|true position - target| [m]", title="control error")
+    axes.set_yscale("log")
+    axes.set_ylim(bottom=max(1e-3 * float(distance.max()), 1e-9))
     axes.legend(loc="best", fontsize="small")
     axes.grid(alpha=0.3)
 

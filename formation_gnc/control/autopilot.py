@@ -61,8 +61,11 @@ class Autopilot(Part[Any, Controller]):
     def __init__(self, name: str, parameters: Any) -> None:
         """Design the law that `parameters.algorithm` names; raises ConfigurationError when it cannot be."""
         super().__init__(name, parameters)
-        self._force = np.zeros(3)
         self._limit = np.array(parameters.thrust_limit)
+
+    def forget(self) -> None:
+        """Nothing has been flown yet."""
+        self._force = np.zeros(3)
         self._predecessor: str | None = None
         self._withheld = np.zeros(3)
         self._fallback = ""

@@ -59,7 +59,7 @@ def fuel_weights(tanks: Vector) -> Vector:
     if not (np.isfinite(left).all() and (left > 0.0).all()):
         raise ConfigurationError(f"tanks: {left.tolist()} is not allowed; each must be above zero and finite")
     weights: Vector = 1.0 / left
-    return weights / weights.mean()
+    return np.asarray(weights / weights.mean())
 
 
 def transfer_costs(

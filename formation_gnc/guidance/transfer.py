@@ -75,7 +75,7 @@ def _stretches(duration: float, mean_motion: float) -> tuple[Vector, float]:
     """Times (s) from the end of each stretch of constant thrust to the end of a transfer, and its length."""
     count = max(SEGMENTS, math.ceil(SEGMENTS * duration * mean_motion / math.tau))
     step = duration / count
-    return step * np.arange(count - 1, -1, -1), step
+    return np.asarray(step * np.arange(count - 1, -1, -1)), step
 
 
 def delta_v(errors: Matrix, duration: float, mean_motion: float) -> Vector:
