@@ -242,6 +242,18 @@ class Flight:
     chief_known: bool = True
 
 
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """What became of a tick's readings: those used, and how many the gates refused."""
+
+    sensor: list[int]
+    innovation: list[float]
+    sigma: list[float]
+    """Predicted standard deviations of the innovations."""
+    nis: float
+    refused: int
+
+
 class Navigator(Part[NavigationParameters, Design]):
     """Filter of one deputy, from measurement to estimate.
 
@@ -435,40 +447,19 @@ class Navigator(Part[NavigationParameters, Design]):
         self._refusals.add(Refusal.CHIEF, "chief ephemeris")
 
     def _update(self, flight: Flight, measurement: Measurement, status: EstimateStatus) -> Estimate | None:
-        used: list[int] = []
-        innovation: list[float] = []
-        sigma: list[float] = []
-        nis = 0.0
-        if measurement.sensor:
-            readings = flight.screen.admit(
-                measurement,
-                self.configuration.design.variance,
-                self.parameters.latest,
-                flight.chief,
-                flight.track,
-            )
-            if readings is not None:
-                admitted = len(readings.value)
-                weighed = self._weigh(flight, readings)
-                if weighed is not None:
-                    readings, offset, variance, jacobian = weighed
-                    flight.observability.take(jacobian, readings.variance)
-                    used = readings.sensor.tolist()
-                    innovation, sigma = offset.tolist(), np.sqrt(variance).tolist()
-                    nis = flight.filter.correct(self._pseudo(readings))
-                    flight.last_reading = flight.time
-                if not (kernels.sound(flight.filter.x, flight.filter.P) and isfinite(nis)):
-                    raise ArithmeticError("the update is not finite")
-                verdict, factor = flight.consistency.judge(nis, len(used), admitted - len(used))
-                if verdict is Verdict.GIVE_UP:
-                    self._give_up(measurement.time, "readings contradict the state, however uncertain")
-                    return None
-                if verdict is Verdict.INFLATE:
-                    if self._can_acquire(measurement):
-                        return self._update(self._acquire(measurement), measurement, EstimateStatus.ACQUIRED)
-                    flight.filter.P = flight.filter.P * factor
-                    self.record(measurement.time, "diverged", f"covariance inflated by {factor:.3g}")
-                    status = EstimateStatus.DIVERGED
+        """Take the readings, judge the filter by them, and answer; no answer when the state is given up."""
+        taken = self._take(flight, measurement)
+        if taken is not None:
+            verdict, factor = flight.consistency.judge(taken.nis, len(taken.sensor), taken.refused)
+            if verdict is Verdict.GIVE_UP:
+                self._give_up(measurement.time, "readings contradict the state, however uncertain")
+                return None
+            if verdict is Verdict.INFLATE and self._can_acquire(measurement):
+                return self._update(self._acquire(measurement), measurement, EstimateStatus.ACQUIRED)
+            if verdict is Verdict.INFLATE:
+                flight.filter.P = flight.filter.P * factor
+                self.record(measurement.time, "diverged", f"covariance inflated by {factor:.3g}")
+                status = EstimateStatus.DIVERGED
         if status is EstimateStatus.TRACKING:
             if not flight.chief_known:
                 status = EstimateStatus.CHIEF_LOST
@@ -481,15 +472,39 @@ class Navigator(Part[NavigationParameters, Design]):
             chief_state=flight.chief,
             mass=flight.mass,
             eclipse=measurement.eclipse,
-            sensor=used,
-            innovation=innovation,
-            innovation_sigma=sigma,
-            nis=nis,
+            sensor=taken.sensor if taken else [],
+            innovation=taken.innovation if taken else [],
+            innovation_sigma=taken.sigma if taken else [],
+            nis=taken.nis if taken else 0.0,
             status=int(status),
             refusals=self._refusals.counts,
             blind_direction=flight.observability.direction,
             blind=flight.observability.words,
         )
+
+    def _take(self, flight: Flight, measurement: Measurement) -> Taken | None:
+        """Update with the readings that pass; none when there is nothing to weigh.
+
+        Raises ArithmeticError when the result is not finite.
+        """
+        if not measurement.sensor:
+            return None
+        variance, latest = self.configuration.design.variance, self.parameters.latest
+        readings = flight.screen.admit(measurement, variance, latest, flight.chief, flight.track)
+        if readings is None:
+            return None
+        admitted = len(readings.value)
+        weighed = self._weigh(flight, readings)
+        if weighed is None:
+            return Taken([], [], [], 0.0, admitted)
+        readings, innovation, spread, jacobian = weighed
+        flight.observability.take(jacobian, readings.variance)
+        nis = flight.filter.correct(self._pseudo(readings))
+        if not (kernels.sound(flight.filter.x, flight.filter.P) and isfinite(nis)):
+            raise ArithmeticError("the update is not finite")
+        flight.last_reading = flight.time
+        sensor = readings.sensor.tolist()
+        return Taken(sensor, innovation.tolist(), np.sqrt(spread).tolist(), nis, admitted - len(sensor))
 
     def _weigh(self, flight: Flight, readings: Readings) -> tuple[Readings, Vector, Vector, Matrix] | None:
         """The readings that pass the gate, their innovations, the variances of these and the Jacobian."""

@@ -109,7 +109,7 @@ def drift(model: str, about: Mission) -> float:
 
 def test_each_model_drifts_least_where_it_belongs() -> None:
     circular, eccentric = mission(), mission(0.1)
-    # measured: 131 m and 327 m, where the short-period terms of J2 at the start are most of the 131 m
+    # measured: 131 m and 327 m; the start leaves out the short-period terms of J2
     assert drift("j2_mean_motion", circular) < 0.5 * drift("hill", circular)
     assert drift("yamanaka_ankersen", eccentric) < 0.03 * drift("hill", eccentric)
 

@@ -1,0 +1,38 @@
+"""How near satellites came to one another."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from formation_gnc.interface import Matrix, Vector
+
+
+@dataclass(frozen=True)
+class Separation:
+    """The nearest approach of a fleet."""
+
+    distance: float
+    """m."""
+    time: float
+    """When, s."""
+    pair: tuple[str, str]
+    """Who."""
+
+
+def minimum_separation(times: Vector, positions: Matrix, names: Sequence[str]) -> Separation | None:
+    """Nearest approach of any two satellites, at the instants given; none for fewer than two.
+
+    Args:
+        times: (N,) s.
+        positions: (satellites, N, 3), in one frame, m.
+        names: of the satellites.
+    """
+    nearest: Separation | None = None
+    for one, other in combinations(range(len(names)), 2):
+        distances = np.linalg.norm(positions[one] - positions[other], axis=1)
+        index = int(distances.argmin())
+        if nearest is None or distances[index] < nearest.distance:
+            nearest = Separation(float(distances[index]), float(times[index]), (names[one], names[other]))
+    return nearest
