@@ -72,11 +72,7 @@ class RecorderNode(ConfiguredNode):
         return monotonic() - self._last_message > QUIET
 
     def close(self) -> None:
-        """Write what is known only at the end, and finish the bag."""
-        for node, values in sorted(self._settings.items()):
-            self.bag.add_metadata(
-                f"parameters {node}", {name: json.dumps(value) for name, value in values.items()}
-            )
+        """Finish the bag."""
         self.bag.close()
 
     def _look(self) -> None:
@@ -150,6 +146,9 @@ class RecorderNode(ConfiguredNode):
                 for name, value in zip(names, answer.result().values, strict=True)
                 if value.type != ParameterType.PARAMETER_NOT_SET
             }
+            # at once, so that a bag that is cut short can be flown again
+            recorded = {name: json.dumps(value) for name, value in self._settings[node].items()}
+            self.bag.add_metadata(f"parameters {node}", recorded)
 
         client.list_parameters(callback=on_list)
 
