@@ -6,7 +6,9 @@ from itertools import combinations
 
 import numpy as np
 
+from formation_gnc.analysis.metrics import deputies_of
 from formation_gnc.interface import Matrix, Vector
+from formation_gnc.recording.reader import Bag
 
 
 @dataclass(frozen=True)
@@ -36,3 +38,10 @@ def minimum_separation(times: Vector, positions: Matrix, names: Sequence[str]) -
         if nearest is None or distances[index] < nearest.distance:
             nearest = Separation(float(distances[index]), float(times[index]), (names[one], names[other]))
     return nearest
+
+
+def nearest_approach(bag: Bag) -> Separation | None:
+    """Nearest approach of any two deputies of a recorded run, tick by tick, by the truth."""
+    names, truth = deputies_of(bag), bag.arrays("/truth")
+    positions = [truth[f"deputies.{index}.relative_state"][:, :3] for index in range(len(names))]
+    return minimum_separation(truth["time"], np.array(positions), names)

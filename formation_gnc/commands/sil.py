@@ -173,10 +173,11 @@ def _fly_in_process(scenario: Scenario, bag: Path, console: Console) -> float:
 def _summarise(scenario: Scenario, bag: Path, speedup: float, as_json: bool) -> int:
     from formation_gnc.analysis.metrics import figures
     from formation_gnc.analysis.overview import draw_overview
+    from formation_gnc.analysis.separation import nearest_approach
     from formation_gnc.recording.reader import Bag
 
     recorded = Bag(bag)
-    result = figures(recorded)
+    result, nearest = figures(recorded), nearest_approach(recorded)
     picture = draw_overview(recorded, bag / "overview.png", scenario.name)
     if as_json:
         summary = {
@@ -189,6 +190,8 @@ def _summarise(scenario: Scenario, bag: Path, speedup: float, as_json: bool) -> 
             "picture": str(picture),
             "deputies": {name: dataclasses.asdict(each) for name, each in result.deputies.items()},
         }
+        if nearest is not None:
+            summary["minimum_separation_m"] = nearest.distance
         print(json.dumps(summary, indent=2))
         return 0
     table = Table(title=f"{scenario.name}, seed {scenario.plant.seed}", title_justify="left")
@@ -211,5 +214,9 @@ def _summarise(scenario: Scenario, bag: Path, speedup: float, as_json: bool) -> 
     console = Console(highlight=False)
     console.print(table)
     console.print(f"{result.ticks} ticks, {result.misses} missed, {speedup:,.0f} x real time")
+    if nearest is not None:
+        console.print(
+            f"minimum separation {nearest.distance:.1f} m, {' and '.join(nearest.pair)} at {nearest.time:g} s"
+        )
     console.print(f"bag: {bag}\npicture: {picture}", soft_wrap=True)
     return 0
