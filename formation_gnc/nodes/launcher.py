@@ -23,7 +23,6 @@ from formation_gnc.nodes import topics
 from formation_gnc.parameters import dump
 from formation_gnc.sil.scenario import Scenario
 
-PARTS = ("navigation", "guidance", "controller")
 PR_SET_PDEATHSIG = 1  # from <linux/prctl.h>
 GRACE = 2.0
 """Wall time (s) that nodes have to stop when asked; whoever is left then is killed."""
@@ -195,7 +194,7 @@ def fly_graph(
                 graph.start("/recorder", arguments)
             plant_process = graph.start("/plant", arguments)
             for deputy in scenario.plant.deputies:
-                for part in PARTS:
+                for part in topics.PARTS:
                     graph.start(f"/{deputy}/{part}", arguments)
             with _listener(domain, hear) as listen:
                 while plant_process.process.poll() is None:

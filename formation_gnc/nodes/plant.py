@@ -7,17 +7,13 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from formation_gnc_msgs.msg import Thrust as ThrustMessage
 from rclpy._rclpy_pybind11 import NodeNameNonExistentError
-from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 
 from formation_gnc.interface import NANOSECONDS, Event, Measurement, Thrust, Truth, Vector
 from formation_gnc.nodes import topics
 from formation_gnc.nodes.conversion import from_message
-from formation_gnc.nodes.shell import STOP, ConfiguredNode, run
+from formation_gnc.nodes.shell import ConfiguredNode, asked_to_stop, run
 from formation_gnc.plant.plant import Plant, PlantParameters
-
-PARTS = ("navigation", "guidance", "controller")
-"""Nodes that every deputy must have before the run starts."""
 
 RECORDER_LAG = topics.DEPTH // 4
 """Ticks that the plant may be ahead of the recorder: well inside what the queues hold."""
@@ -41,7 +37,6 @@ class PlantNode(ConfiguredNode):
         """Build the plant from the node's parameters."""
         super().__init__("plant", PlantParameters)
         self.plant = Plant(self.values)
-        self.done = Future()
         self._measurement = {
             name: self.speak(Measurement, f"/{name}/{topics.MEASUREMENT}") for name in self.values.deputies
         }
@@ -68,16 +63,24 @@ class PlantNode(ConfiguredNode):
         self._started = self._tick_started = self._reported = monotonic()
         self._said = ""
 
-    def check(self) -> None:
-        """Do what no message triggers: start, deadlines, pace, a recorder that lags, reports."""
+    def check(self) -> bool:
+        """Do what no message triggers: start, deadlines, pace, a recorder that lags, reports.
+
+        Returns:
+            Whether all ticks are flown.
+        """
         if not self._flying:
             missing = ", ".join(self._missing())
             self._say(f"waiting for {missing}" if missing else "flying")
             if missing:
-                return self._report(self._said)
-            self._flying = True
-            self._started = monotonic()
-            return self._publish_tick()
+                self._report(self._said)
+            else:
+                self._flying = True
+                self._started = monotonic()
+                self._publish_tick()
+            return False
+        if self.plant.finished:
+            return True
         now = monotonic()
         self._recorder_is_there = self.count_publishers(topics.RECORDED) > 0
         late = sorted(self._awaited & self._answered_before)
@@ -86,13 +89,14 @@ class PlantNode(ConfiguredNode):
         elif self._awaited and now - self._tick_started > self.values.deadline:
             self._say(f"waiting for the first answer of {', '.join(sorted(self._awaited))}")
         self._advance_if_ready()
-        if now - self._reported > REPORT_PERIOD:
+        if now - self._reported > REPORT_PERIOD and not self.plant.finished:
             self._report("flying")
+        return self.plant.finished
 
     def _advance_if_ready(self) -> None:
         if (
             not self._awaited
-            and not self.done.done()
+            and not self.plant.finished
             and self._recorder_keeps_up()
             and self._wait_for_pace() <= 0.0
         ):
@@ -121,7 +125,6 @@ class PlantNode(ConfiguredNode):
             detail = f"{self.plant.tick} ticks flown, {self._misses} missed"
             self._tell_event(self.plant.time, self.plant.tick, "end", detail)
             self._report("finished")
-            self.done.set_result(None)
         else:
             self._publish_tick()
 
@@ -184,14 +187,16 @@ class PlantNode(ConfiguredNode):
             f"{namespace.rstrip('/')}/{name}" for name, namespace in self.get_node_names_and_namespaces()
         }
         for deputy in self.values.deputies:
-            for part in PARTS:
+            for part in topics.PARTS:
                 if f"/{deputy}/{part}" not in there:
                     yield f"/{deputy}/{part}"
         if self.values.wait_for_recorder and not self._recorder_listens():
             yield "/recorder"
 
     def _recorder_listens(self) -> bool:
-        """Whether a recorder has subscribed to every topic of the run."""
+        """Whether a recorder has subscribed to every topic of the run, and knows all parameters."""
+        if self._recorded is None:
+            return False
         try:
             heard = dict(self.get_subscriber_names_and_types_by_node("recorder", "/"))
         except NodeNameNonExistentError:
@@ -228,14 +233,8 @@ class PlantNode(ConfiguredNode):
 
 def fly(node: PlantNode) -> None:
     """Fly the run to its end, and see the recorder through."""
-    node.spin((node.done, STOP), node.check, lambda: node.period)
-    recorded = Future()
-
-    def check() -> None:
-        if not node.wait_for_recorder():
-            recorded.set_result(None)
-
-    node.spin((recorded, STOP), check, lambda: CHECK_PERIOD)
+    node.spin(lambda: asked_to_stop() or node.check(), lambda: node.period)
+    node.spin(lambda: asked_to_stop() or not node.wait_for_recorder())
 
 
 def main() -> int:

@@ -62,7 +62,7 @@ class RecorderNode(ConfiguredNode):
         self._settings: dict[str, dict[str, Any]] = {}
         self._time = 0
         self._heard: dict[str, int] = {}
-        self._reported = -1
+        self._reported: int | None = None
         self._last_message = monotonic()
         self.create_timer(LOOK_PERIOD, self._look)
         self.create_timer(FLUSH_INTERVAL, self.bag.flush)
@@ -88,7 +88,14 @@ class RecorderNode(ConfiguredNode):
             if node not in self._settings and client.services_are_ready():
                 self._settings[node] = {}
                 self._ask_parameters(node, client)
-        self._report()
+        if self._knows_the_run():
+            self._report()
+
+    def _knows_the_run(self) -> bool:
+        """Whether the parameters of the plant and of every deputy's nodes are on record."""
+        deputies = self._settings.get("/plant", {}).get("deputies", ())
+        nodes = [f"/{deputy}/{part}" for deputy in deputies for part in topics.PARTS]
+        return bool(nodes) and all(self._settings.get(node) for node in nodes)
 
     def _record(self, topic: str, type_name: str) -> None:
         try:
@@ -161,10 +168,9 @@ def _first_stamp(data: bytes) -> int:
 
 def record(node: RecorderNode) -> None:
     """Record until told to stop, and then until nothing more comes."""
-    quiet = Future()
     try:
         node.spin()
-        node.spin((quiet,), lambda: quiet.set_result(None) if node.is_quiet() else None)
+        node.spin(node.is_quiet)
     finally:
         node.close()
 

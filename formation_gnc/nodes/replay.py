@@ -7,7 +7,6 @@ from time import monotonic
 from typing import Any
 
 from formation_gnc_msgs.msg import Thrust as ThrustMessage
-from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import SetBool, Trigger
 
@@ -16,7 +15,7 @@ from formation_gnc.interface import NANOSECONDS
 from formation_gnc.mission import Mission, Orbit
 from formation_gnc.nodes import topics
 from formation_gnc.nodes.conversion import stamp
-from formation_gnc.nodes.shell import STOP, ConfiguredNode, run
+from formation_gnc.nodes.shell import ConfiguredNode, asked_to_stop, run
 from formation_gnc.parameters import parameter
 from formation_gnc.recording.reader import Bag
 
@@ -87,7 +86,7 @@ class ReplayNode(ConfiguredNode):
             )
         self.create_service(SetBool, "~/pause", self._on_pause)
         self.create_service(Trigger, "~/step", self._on_step)
-        self.done = Future()
+        self.done = False
         self._paused = self.values.paused
         self._ticks = self._read()
         self._awaited: set[str] = set()
@@ -130,12 +129,13 @@ class ReplayNode(ConfiguredNode):
             if not self.values.loop or not any_played:
                 return
 
-    def check(self) -> None:
-        """Play what is due."""
+    def check(self) -> bool:
+        """Play what is due, and say whether that was all."""
         for _ in range(BURST):
-            if self._paused or self.done.done() or not self._is_due():
-                return
+            if self._paused or self.done or not self._is_due():
+                break
             self._play()
+        return self.done
 
     def _is_due(self) -> bool:
         waited = monotonic() - self._played_at
@@ -150,7 +150,7 @@ class ReplayNode(ConfiguredNode):
         try:
             self._time, messages, answers = next(self._ticks)
         except StopIteration:
-            self.done.set_result(None)
+            self.done = True
             return
         self._awaited = {name for name in answers if self.count_publishers(name) > 0}
         self._played_at = monotonic()
@@ -171,18 +171,18 @@ class ReplayNode(ConfiguredNode):
         return response
 
     def _on_step(self, _request: Any, response: Any) -> Any:
-        response.success = self._paused and not self.done.done()
+        response.success = self._paused and not self.done
         if response.success:
             self._play()
             response.message = f"played {(self._time or 0) / NANOSECONDS:g} s"
         else:
-            response.message = "at the end" if self.done.done() else "not paused"
+            response.message = "at the end" if self.done else "not paused"
         return response
 
 
 def play(node: ReplayNode) -> None:
     """Play to the end, or until told to stop."""
-    node.spin((node.done, STOP), node.check, lambda: CHECK_PERIOD)
+    node.spin(lambda: asked_to_stop() or node.check(), lambda: CHECK_PERIOD)
 
 
 def main() -> int:

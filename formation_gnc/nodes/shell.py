@@ -44,8 +44,14 @@ CHECK_PERIOD = 0.1
 FAREWELL = 1.0
 """Wall time (s) that a node waits at its end for its last messages to arrive."""
 
-STOP = Future()
-"""Done when the process has been asked to stop, by SIGINT or SIGTERM."""
+_stop_signals: list[int] = []
+"""Signals that have asked the process to stop. A bare list, since a handler that takes a lock, such as a
+future's, waits for ever when it interrupts the one who holds it."""
+
+
+def asked_to_stop() -> bool:
+    """Whether SIGINT or SIGTERM has come."""
+    return bool(_stop_signals)
 
 
 class ConfiguredNode(Node):  # type: ignore[misc]
@@ -89,11 +95,10 @@ class ConfiguredNode(Node):  # type: ignore[misc]
 
     def spin(
         self,
-        until: Sequence[Future] = (STOP,),
-        check: Callable[[], None] = lambda: None,
+        ended: Callable[[], bool] = asked_to_stop,
         period: Callable[[], float] = lambda: CHECK_PERIOD,
     ) -> None:
-        """Work until any of the futures is done; `check` is called every `period` (s) or sooner.
+        """Work until `ended` says so, which is asked every `period` (s).
 
         One executor serves the node for all its life: a message that one has noticed but not handled is
         lost to the next.
@@ -101,9 +106,8 @@ class ConfiguredNode(Node):  # type: ignore[misc]
         if self._executor is None:
             self._executor = Executor()
             self._executor.add_node(self)
-        while not any(future.done() for future in until):
-            self._executor.spin_until_future_complete(until[0], timeout_sec=period())
-            check()
+        while not ended():
+            self._executor.spin_until_future_complete(Future(), timeout_sec=period())
 
     def destroy_node(self) -> None:
         """Leave only when everybody has what was published."""
@@ -215,8 +219,8 @@ def _answer_from(pool: ThreadPoolExecutor, service: Service) -> None:
 def run(make_node: Callable[[], ConfiguredNode], fly: Callable[[Any], None] = ConfiguredNode.spin) -> int:
     """Body of every executable: make the node, let it fly, and end with the exit status.
 
-    Signals only set `STOP`, since a node that has been asked to stop still has to hand over what it
-    published or recorded.
+    A signal is only noted, since a node that has been asked to stop still has to hand over what it published
+    or recorded.
 
     Returns:
         0 after an ordinary end or an interruption, 1 when a satellite came down, 2 when something given to
@@ -224,7 +228,7 @@ def run(make_node: Callable[[], ConfiguredNode], fly: Callable[[Any], None] = Co
     """
     node = None
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: STOP.done() or STOP.set_result(None))
+        signal.signal(number, lambda number, _: _stop_signals.append(number))
     try:
         rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
         node = make_node()

@@ -1,9 +1,12 @@
-"""Names of topics and the one quality of service they all have."""
+"""Names of nodes and topics, and the one quality of service they all have."""
 
 from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSProfile, QoSReliabilityPolicy
 
 DEPTH = 2000
 """Messages that a writer keeps for who is late or slow, and that the recorder may lag behind."""
+
+PARTS = ("navigation", "guidance", "controller")
+"""Nodes of every deputy, in its namespace."""
 
 CLOCK = "/clock"
 TRUTH = "/truth"
