@@ -1,5 +1,6 @@
 """What all nodes share: parameters from a schema, the main loop, and the shell of a part."""
 
+import gc
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -232,6 +233,7 @@ def run(make_node: Callable[[], ConfiguredNode], fly: Callable[[Any], None] = Co
     try:
         rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
         node = make_node()
+        gc.freeze()  # what was built to fly lives to the end: no use looking through it again and again
         fly(node)
     except (ConfigurationError, *REFUSED_BY_ROS) as refusal:
         print(f"{Path(sys.argv[0]).name}: {' '.join(str(refusal).split())}", file=sys.stderr)
