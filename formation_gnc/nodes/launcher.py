@@ -135,6 +135,29 @@ class Report:
 
 
 @contextmanager
+def _noted_interrupts() -> Iterator[Callable[[], None]]:
+    """A function that raises KeyboardInterrupt if SIGINT or SIGTERM has come.
+
+    Raised by the handler itself it could strike inside rclpy, which now and then swallows it.
+    """
+    noted: list[int] = []
+    previous = {
+        number: signal.signal(number, lambda number, _: noted.append(number))
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+
+    def check() -> None:
+        if noted:
+            raise KeyboardInterrupt
+
+    try:
+        yield check
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
 def _listener(domain: int, hear: Callable[[Report], None]) -> Iterator[Callable[[float], None]]:
     """A function that listens to the run's diagnostics for a time (s)."""
     context = Context()
@@ -182,6 +205,7 @@ def fly_graph(
     with (
         tempfile.TemporaryDirectory(prefix="formation_gnc-") as directory,
         domain_coordinator.domain_id() as domain,
+        _noted_interrupts() as raise_if_interrupted,
     ):
         file = Path(directory) / f"{scenario.name}.yaml"
         recorder = {"/recorder": {"bag": str(bag), **_mission(scenario)}} if bag else {}
@@ -199,6 +223,7 @@ def fly_graph(
             with _listener(domain, hear) as listen:
                 while plant_process.process.poll() is None:
                     listen(0.1)
+                    raise_if_interrupted()
                     graph.check()
                 graph.check()
                 end = monotonic() + LAST_WORD

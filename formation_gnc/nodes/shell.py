@@ -42,7 +42,7 @@ REFUSED_BY_ROS = (RCLInvalidROSArgsError, UnknownROSArgsError, RCLError, RMWErro
 CHECK_PERIOD = 0.1
 """Wall time (s) after which a node notices at the latest that it has been asked to stop."""
 
-FAREWELL = 1.0
+FAREWELL = 0.5
 """Wall time (s) that a node waits at its end for its last messages to arrive."""
 
 _stop_signals: list[int] = []

@@ -63,7 +63,12 @@ def test_averaged_acceleration_is_radial_and_sets_the_rate(reference):
 
 
 @pytest.mark.parametrize("kind", [SchweighartSedwickModel, SchweighartSedwickNodalModel])
-@given(reference=references, start=st.floats(-1.0, 1.0), turns=st.floats(-1.5, 1.5))
+# Shorter than a microsecond, no number has digits enough left for a comparison.
+@given(
+    reference=references,
+    start=st.floats(-1.0, 1.0),
+    turns=st.floats(-1.5, 1.5).filter(lambda turns: abs(turns) > 1e-9),
+)
 def test_closed_form_solves_the_differential_equation(kind, reference, start, turns):
     model = kind(reference)
     time, duration = start * 1e4, turns * math.tau / reference.mean_motion
