@@ -30,7 +30,7 @@ from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.schweighart_sedwick import CircularReference, SchweighartSedwickModel
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
-from verification.relative_motion import TABLE, Figure
+from verification.relative_motion import TABLE, Figure, failures
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
@@ -563,10 +563,7 @@ def main(directory: Path) -> int:
         figures += limits
     heading = "# Control\n\nWritten by `verification/control.py`.\n\n"
     (directory / "control.md").write_text(heading + "\n".join(sections))
-    failures = [figure for figure in figures if not figure.holds]
-    for figure in failures:
-        print(f"outside its tolerance: {figure.row}", file=sys.stderr)
-    return len(failures)
+    return failures(figures)
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from formation_gnc.orbit.forces import Body, Forces
 from formation_gnc.orbit.frames import relative_from_inertial
 from formation_gnc.orbit.propagation import Propagator
 from verification.independent import Basilisk, Heyoka, Places, jpl, series
-from verification.relative_motion import TABLE, Figure
+from verification.relative_motion import TABLE, Figure, failures
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
@@ -340,10 +340,7 @@ def main(directory: Path) -> int:
     )
     verdicts = "## Stated tolerances\n\n" + "\n".join([TABLE, *(figure.row for figure in figures)]) + "\n"
     (directory / "dynamics.md").write_text("\n".join([heading, *texts, verdicts]))
-    failures = [figure for figure in figures if not figure.holds]
-    for figure in failures:
-        print(f"outside its tolerance: {figure.row}", file=sys.stderr)
-    return len(failures)
+    return failures(figures)
 
 
 if __name__ == "__main__":

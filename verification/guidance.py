@@ -21,7 +21,7 @@ from formation_gnc.orbit.frames import inertial_from_relative, relative_from_ine
 from formation_gnc.orbit.propagation import Propagator
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.tschauner_hempel import TschaunerHempelModel
-from verification.relative_motion import TABLE, Figure
+from verification.relative_motion import TABLE, Figure, failures
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
@@ -223,10 +223,7 @@ def main(directory: Path) -> int:
         "# Guidance\n\nWritten by `verification/guidance.py`; theory: [guidance](../theory/guidance.md).\n\n"
     )
     (directory / "guidance.md").write_text(heading + "\n".join(sections))
-    failures = [figure for figure in figures if not figure.holds]
-    for figure in failures:
-        print(f"outside its tolerance: {figure.row}", file=sys.stderr)
-    return len(failures)
+    return failures(figures)
 
 
 if __name__ == "__main__":

@@ -31,7 +31,7 @@ from formation_gnc.navigation.rehearsal import START, Sample, navigator, nees, r
 from formation_gnc.orbit.frames import hill_transform
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
-from verification.relative_motion import Figure
+from verification.relative_motion import Figure, failures
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
@@ -790,10 +790,7 @@ Written by `verification/navigation.py`; the theory is in [navigation](../theory
 {table}
 """
     (directory / "navigation.md").write_text(page)
-    failures = [figure for figure in figures if not figure.holds]
-    for figure in failures:
-        print(f"outside its tolerance: {figure.row}", file=sys.stderr)
-    return len(failures)
+    return failures(figures)
 
 
 if __name__ == "__main__":

@@ -350,6 +350,14 @@ def all_models(directory: Path) -> tuple[str, list[Figure]]:
     return "\n".join(lines), limits
 
 
+def failures(figures: Sequence[Figure]) -> int:
+    """How many figures are outside their tolerance; each is named on standard error."""
+    failed = [figure for figure in figures if not figure.holds]
+    for figure in failed:
+        print(f"outside its tolerance: {figure.row}", file=sys.stderr)
+    return len(failed)
+
+
 def main(directory: Path) -> int:
     """Write the section and its plots; return how many figures are outside their tolerance."""
     directory.mkdir(parents=True, exist_ok=True)
@@ -360,10 +368,7 @@ def main(directory: Path) -> int:
         figures += limits
     heading = "# Relative-motion models\n\nWritten by `verification/relative_motion.py`.\n\n"
     (directory / "relative_motion.md").write_text(heading + "\n".join(sections))
-    failures = [figure for figure in figures if not figure.holds]
-    for figure in failures:
-        print(f"outside its tolerance: {figure.row}", file=sys.stderr)
-    return len(failures)
+    return failures(figures)
 
 
 if __name__ == "__main__":
