@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
 from formation_gnc.control.feed_forward import FeedForward
@@ -14,8 +15,9 @@ from formation_gnc.control.riccati import (
     periodic_gains,
     stationary_gain,
 )
+from formation_gnc.control.weights import QuadraticWeights
 from formation_gnc.errors import DesignError
-from formation_gnc.interface import NANOSECONDS, Estimate, Matrix, Target, Vector
+from formation_gnc.interface import NANOSECONDS, Estimate, Matrix, Target
 from formation_gnc.mission import Mission
 from formation_gnc.parameters import parameter
 from formation_gnc.relative.model import RelativeModel
@@ -29,9 +31,8 @@ MOST_STEPS = 50_000
 
 
 @dataclass(frozen=True)
-class LqrParameters:
-    """Weights by Bryson's rule, each the size that costs as much as any other, or as matrices; and which
-    gain."""
+class LqrParameters(QuadraticWeights):
+    """Weights, model, and which gain."""
 
     model: str = parameter(
         "hill",
@@ -52,44 +53,12 @@ class LqrParameters:
     terminal_weight: float = parameter(
         1.0, minimum=0.0, in_flight=True, doc="state weight at the final time over that of one tick"
     )
-    position_error: tuple[float, ...] = parameter(
-        (1.0, 1.0, 1.0),
-        unit="m",
-        length=3,
-        above=0.0,
-        in_flight=True,
-        doc="position error that weighs one, per Hill axis",
-    )
-    velocity_error: tuple[float, ...] = parameter(
-        (0.01, 0.01, 0.01),
-        unit="m/s",
-        length=3,
-        above=0.0,
-        in_flight=True,
-        doc="velocity error that weighs one, per Hill axis",
-    )
-    thrust: tuple[float, ...] = parameter(
-        (0.01, 0.01, 0.01),
-        unit="N",
-        length=3,
-        above=0.0,
-        in_flight=True,
-        doc="force that weighs one, per Hill axis",
-    )
     integral_error: float = parameter(
         0.0,
         unit="m s",
         minimum=0.0,
         in_flight=True,
         doc="integral of position error that weighs one; 0 for no integral",
-    )
-    state_weight: tuple[float, ...] = parameter(
-        (),
-        in_flight=True,
-        doc="weight Q (6 x 6, row by row, SI) in place of position_error and velocity_error",
-    )
-    thrust_weight: tuple[float, ...] = parameter(
-        (), unit="1/N^2", in_flight=True, doc="weight R on force (3 x 3, row by row) in place of thrust"
     )
     feed_forward: str = parameter(
         "none",
@@ -129,10 +98,10 @@ class LinearQuadraticRegulator(Controller):
         self._feed_forward = FeedForward(parameters.feed_forward, model)
         self._integral = np.zeros(3)
         self._start: int | None = None
-        state_weight, thrust_weight = weight_matrices(parameters)
         try:
+            thrust_weight = vehicle.mass**2 * parameters.thrust_matrix()
             self._design(
-                parameters, model, Weights.scaled(state_weight, vehicle.mass**2 * thrust_weight, mission.tick)
+                parameters, model, Weights.scaled(_with_integral(parameters), thrust_weight, self.tick)
             )
         except DesignError as error:
             raise DesignError(f"lqr: {error}") from error
@@ -169,7 +138,7 @@ class LinearQuadraticRegulator(Controller):
                     allowed = f"it must be 1 to {MOST_STEPS} ticks of {tick} s"
                     raise DesignError(f"final_time is {parameters.final_time} s; {allowed}")
                 terminal = np.zeros((len(phi), len(phi)))
-                terminal[:6, :6] = parameters.terminal_weight * weight_matrices(parameters)[0][:6, :6]
+                terminal[:6, :6] = parameters.terminal_weight * parameters.state_matrix()
                 self.gains = finite_gains(phi, gamma, weights, terminal, steps)
 
     def _discretise(self, model: RelativeModel, time: float) -> tuple[Matrix, Matrix]:
@@ -223,29 +192,9 @@ class LinearQuadraticRegulator(Controller):
         return Command(force, fallback=reason)
 
 
-def weight_matrices(parameters: LqrParameters) -> tuple[Matrix, Matrix]:
-    """Q (6, 6), or (9, 9) with the integral of position, and R (3, 3) on force, in SI units.
-
-    Raises:
-        DesignError: a matrix with the wrong number of elements.
-    """
-    error = np.array(parameters.position_error + parameters.velocity_error)
-    q = _matrix("state_weight", parameters.state_weight, 6, error)
-    r = _matrix("thrust_weight", parameters.thrust_weight, 3, np.array(parameters.thrust))
-    if parameters.integral_error > 0.0:
-        joint = np.zeros((9, 9))
-        joint[:6, :6] = q
-        joint[6:, 6:] = np.eye(3) / parameters.integral_error**2
-        q = joint
-    return q, r
-
-
-def _matrix(name: str, values: tuple[float, ...], size: int, allowed: Vector) -> Matrix:
-    """The matrix that is given, or Bryson's rule."""
-    if not values:
-        return np.diag(allowed**-2.0)
-    if len(values) != size**2:
-        raise DesignError(
-            f"lqr: {name} has {len(values)} values; it must have {size**2} ({size} rows of {size})"
-        )
-    return np.array(values).reshape(size, size)
+def _with_integral(parameters: LqrParameters) -> Matrix:
+    """Q (6, 6), or (9, 9) with the integral of position."""
+    q = parameters.state_matrix()
+    if not parameters.integral_error > 0.0:
+        return q
+    return np.asarray(block_diag(q, np.eye(3) / parameters.integral_error**2))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import slycot  # type: ignore[import-untyped]
+import slycot
 from scipy.linalg import expm, solve_continuous_are
 
 from formation_gnc.errors import DesignError

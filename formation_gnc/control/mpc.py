@@ -12,6 +12,7 @@ from formation_gnc.control.models import DESIGN_MODELS
 from formation_gnc.control.night import Night
 from formation_gnc.control.programme import Programme, facet_normals, facet_reach
 from formation_gnc.control.riccati import Weights, periodic_cost_to_go
+from formation_gnc.control.weights import QuadraticWeights
 from formation_gnc.errors import DesignError
 from formation_gnc.interface import NANOSECONDS, Estimate, Target, Vector
 from formation_gnc.mission import Mission
@@ -43,8 +44,8 @@ KEEP_OUT_WEIGHT = 1e4
 
 
 @dataclass(frozen=True)
-class MpcParameters:
-    """Plan, weights by Bryson's rule, and limits."""
+class MpcParameters(QuadraticWeights):
+    """Weights, plan and limits."""
 
     model: str = parameter(
         "hill", choices=tuple(DESIGN_MODELS), in_flight=True, doc="relative motion that the plan is made on"
@@ -67,38 +68,14 @@ class MpcParameters:
         "running",
         choices=("running", "terminal"),
         in_flight=True,
-        doc="running: the error at all times, beyond the horizon as LQR would pay; terminal: only at the "
-        "horizon's end (Kremmydas)",
+        doc="running: the error at all times, beyond the horizon as LQR would pay, and thrust by the tick; "
+        "terminal: only the error at the horizon's end, and thrust by the step (Kremmydas)",
     )
     cost: str = parameter(
         "quadratic",
         choices=("quadratic", "absolute"),
         in_flight=True,
         doc="cost of thrust; absolute is delta-v",
-    )
-    position_error: tuple[float, ...] = parameter(
-        (1.0, 1.0, 1.0),
-        unit="m",
-        length=3,
-        above=0.0,
-        in_flight=True,
-        doc="position error that weighs one, per Hill axis",
-    )
-    velocity_error: tuple[float, ...] = parameter(
-        (0.01, 0.01, 0.01),
-        unit="m/s",
-        length=3,
-        above=0.0,
-        in_flight=True,
-        doc="velocity error that weighs one, per Hill axis",
-    )
-    thrust: tuple[float, ...] = parameter(
-        (0.01, 0.01, 0.01),
-        unit="N",
-        length=3,
-        above=0.0,
-        in_flight=True,
-        doc="force that weighs one, per Hill axis; over a tick when running, over a step when terminal",
     )
     total_thrust: float = parameter(
         0.0,
@@ -183,17 +160,13 @@ class ModelPredictiveController(Controller):
                 f"mpc: the horizon with thrust, {self._steps * parameters.step:.0f} s, is not longer "
                 f"than the eclipse, {self._night.longest:.0f} s"
             )
-        self.reserve = LinearQuadraticRegulator(
-            LqrParameters(
-                model=parameters.model,
-                gain="discrete" if self._model.is_time_invariant else "periodic",
-                position_error=parameters.position_error,
-                velocity_error=parameters.velocity_error,
-                thrust=parameters.thrust,
-            ),
-            mission,
-            vehicle,
-        )
+        gain = "discrete" if self._model.is_time_invariant else "periodic"
+        try:
+            self.reserve = LinearQuadraticRegulator(
+                LqrParameters(model=parameters.model, gain=gain, **parameters.weights()), mission, vehicle
+            )
+        except DesignError as error:
+            raise DesignError(f"mpc, in reserve {error}") from error
         self._force = np.zeros(3)
         self._plan = np.empty((0, 3))
         self._planned_at = 0
@@ -207,8 +180,7 @@ class ModelPredictiveController(Controller):
         """The programme at each of the places along the orbit."""
         parameters, tick = self._parameters, self._tick_ns / NANOSECONDS
         stretches = 1 if self._model.is_time_invariant else STRETCHES
-        error = np.array(parameters.position_error + parameters.velocity_error)
-        state_weight, thrust_weight = np.diag(error**-2.0), np.diag(np.array(parameters.thrust) ** -2.0)
+        state_weight, thrust_weight = parameters.state_matrix(), parameters.thrust_matrix()
         grid = self._model.period / stretches * np.arange(stretches)
         table = [self._model.discretise(float(time), parameters.step) for time in grid]
         phi, gamma = (np.array(each) for each in zip(*table, strict=True))

@@ -49,6 +49,18 @@ def test_without_active_limits_it_is_the_lqr(mission, vehicle, estimate, target)
         )
 
 
+def test_matrices_in_place_of_bryson_weights(mission, vehicle, estimate, target):
+    matrices = MpcParameters(
+        state_weight=tuple(np.diag([0.01] * 3 + [100.0] * 3).ravel()),
+        thrust_weight=tuple((np.eye(3) / 0.002**2).ravel()),
+    )
+    ours, theirs = (
+        law.command(estimate(OFFSET), target()).force
+        for law in (make(mission, vehicle), ModelPredictiveController(matrices, mission, vehicle))
+    )
+    np.testing.assert_allclose(ours, theirs, rtol=1e-6)
+
+
 @pytest.mark.parametrize("weighting", ["running", "terminal"])
 def test_the_plan_is_the_optimum_within_the_limits(weighting, mission, vehicle, estimate, target):
     law = make(mission, vehicle, weighting=weighting, position_error=(1.0,) * 3, velocity_error=(0.01,) * 3)
@@ -288,6 +300,10 @@ def test_equal_inputs_give_equal_bits(mission, vehicle, estimate, target):
         ({"control_horizon": 31}, "control_horizon is 31 steps; it must be at most horizon, 30"),
         ({"eclipse": "share"}, "is not longer than the eclipse"),
         ({"eclipse": "observed"}, "is not longer than the eclipse"),
+        (
+            {"state_weight": tuple(-np.eye(6).ravel())},
+            "mpc, in reserve lqr: the state weight has a normalised",
+        ),
     ],
 )
 def test_inadmissible_parameters_are_refused_with_the_reason(changes, message, mission, vehicle):
