@@ -4,7 +4,8 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from formation_gnc.interface import Estimate, Target, Vector
+from formation_gnc.control.linear import LinearController
+from formation_gnc.interface import Estimate, Matrix, Target, Vector
 from formation_gnc.mission import Mission
 
 
@@ -69,3 +70,21 @@ class Controller(ABC):
     @abstractmethod
     def command(self, estimate: Estimate, target: Target) -> Command:
         """The force for the tick that begins at the estimate's stamp."""
+
+    def figures(self) -> dict[str, Any]:
+        """What there is to say of the design: names with units, and numbers, lists of them or words."""
+        return {}
+
+    def linear(self, time: int) -> LinearController | None:
+        """The law per tick, without limits, as it is at a time of the run (ns); none when it is not linear.
+
+        A law that has one has the `model` that it is designed on among its parameters.
+        """
+        return None
+
+    def singular_values(self, frequency: Vector) -> dict[str, Matrix]:
+        """Those that the design bounds, by name with unit: (N, 3) over frequencies (N,), rad/s.
+
+        Names that begin with "gamma /" are the bounds.
+        """
+        return {}

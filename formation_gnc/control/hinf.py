@@ -1,16 +1,18 @@
 """H-infinity control."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag, solve_discrete_lyapunov
 
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
+from formation_gnc.control.linear import LinearController
 from formation_gnc.control.mixed_sensitivity import Problem, Weight
 from formation_gnc.control.models import DESIGN_MODELS
 from formation_gnc.control.riccati import spectral_radius
 from formation_gnc.errors import DesignError
-from formation_gnc.interface import Estimate, Target, Vector
+from formation_gnc.interface import Estimate, Matrix, Target, Vector
 from formation_gnc.mission import Mission
 from formation_gnc.parameters import parameter
 
@@ -132,7 +134,7 @@ class HInfinityController(Controller):
             parameters.pole_shift,
             parameters.disturbance,
         )
-        self._limit = vehicle.thrust_limit
+        self._limit, self._mass = vehicle.thrust_limit, vehicle.mass
         self._force = np.zeros(3)
         self._states: Vector | None = None
         try:
@@ -173,6 +175,32 @@ class HInfinityController(Controller):
         self._from_error = ((free - to_force @ scaled_c @ free) / unit[:6]) * unit[
             6:, None
         ] - self._from_force @ d @ seen
+
+    def figures(self) -> dict[str, Any]:
+        """What gamma was reached, and how fast the controller is."""
+        return {
+            "best gamma": self.best_gamma,
+            "gamma": self.gamma,
+            "states": len(self.sampled.a),
+            "controller poles, real parts [1/s]": sorted(np.linalg.eigvals(self.continuous.a).real.tolist()),
+        }
+
+    def linear(self, time: int) -> LinearController:
+        """The sampled controller."""
+        return self.sampled
+
+    def singular_values(self, frequency: Vector) -> dict[str, Matrix]:
+        """S, T and KS of the continuous loop, and what gamma allows them."""
+        values = self.problem.singular_values(self.continuous, frequency)
+        effort = np.ones((len(frequency), 1)) / self.problem.effort
+        return {
+            "S": values["S"],
+            "T": values["T"],
+            "KS [N/m]": self._mass * values["KS"],
+            "gamma / w_P": self.gamma / self.problem.performance.at(frequency),
+            "gamma / w_T": self.gamma / self.problem.uncertainty.at(frequency),
+            "gamma / w_u [N/m]": self._mass * self.gamma * effort,
+        }
 
     def take_over(self, handover: Handover) -> None:
         """Start from the force that flew before."""

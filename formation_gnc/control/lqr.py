@@ -1,12 +1,14 @@
 """Linear quadratic regulator."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
 from formation_gnc.control.feed_forward import FeedForward
+from formation_gnc.control.linear import LinearController
 from formation_gnc.control.models import DESIGN_MODELS
 from formation_gnc.control.riccati import (
     Weights,
@@ -93,7 +95,7 @@ class LinearQuadraticRegulator(Controller):
         """
         model = DESIGN_MODELS[parameters.model](mission)
         self.tick = mission.tick
-        self._limit = vehicle.thrust_limit
+        self._limit, self._mass = vehicle.thrust_limit, vehicle.mass
         self._integrates = parameters.integral_error > 0.0
         self._feed_forward = FeedForward(parameters.feed_forward, model)
         self._integral = np.zeros(3)
@@ -169,6 +171,20 @@ class LinearQuadraticRegulator(Controller):
         share, size = place - index, len(self.gains)
         gain: Matrix = (1.0 - share) * self.gains[index % size] + share * self.gains[(index + 1) % size]
         return gain
+
+    def figures(self) -> dict[str, Any]:
+        """The gain on force, or the mean of those along the orbit."""
+        return {
+            "gain [N/m, N/(m/s), N/(m s)]": (self._mass * self.gain).tolist(),
+            "gains along the orbit": len(self.gains),
+        }
+
+    def linear(self, time: int) -> LinearController:
+        """The gain of a time, after the horizon of a finite one."""
+        gain = self.gain if self._finite else self.gain_at(time)
+        integral = np.eye(gain.shape[1] - 6)
+        inputs = self.tick * np.eye(len(integral), 6)
+        return LinearController(integral, inputs, -gain[:, 6:], -gain[:, :6])
 
     def take_over(self, handover: Handover) -> None:
         """Keep the integral of an LQR that flew before."""

@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 import slycot
-from scipy.linalg import expm, solve_continuous_are
+from scipy.linalg import solve_continuous_are
 
+from formation_gnc.control.linear import LinearController
 from formation_gnc.errors import DesignError
 from formation_gnc.interface import Matrix, Vector
 
@@ -47,31 +48,6 @@ class Weight:
     def at(self, frequency: Vector) -> Matrix:
         """(N, 3) magnitudes at frequencies (N,), rad/s."""
         return np.abs(self.direct + self.residue / (1j * frequency[:, None] + self.pole))
-
-
-@dataclass(frozen=True)
-class LinearController:
-    """States xi of a controller of a measured error v: dxi/dt = A xi + B v, u = C xi + D v; or the same per
-    tick."""
-
-    a: Matrix
-    b: Matrix
-    c: Matrix
-    d: Matrix
-
-    def discretised(self, tick: float) -> "LinearController":
-        """Exact for an error held over the tick."""
-        size, inputs = self.b.shape
-        joint = np.zeros((size + inputs, size + inputs))
-        joint[:size, :size], joint[:size, size:] = self.a, self.b
-        joint = expm(joint * tick)
-        return LinearController(joint[:size, :size], joint[:size, size:], self.c, self.d)
-
-    def closed_loop(self, a: Matrix, b: Matrix) -> Matrix:
-        """(6 + n, 6 + n) matrix of plant and controller together, for a plant a (6, 6), b (6, 3), both per
-        tick or not."""
-        seen = np.eye(6)[: self.b.shape[1]]
-        return np.block([[a + b @ self.d @ seen, b @ self.c], [self.b @ seen, self.a]])
 
 
 @dataclass(frozen=True)

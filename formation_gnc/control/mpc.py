@@ -1,12 +1,14 @@
 """Model predictive control."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import osqp
 from scipy import sparse
 
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
+from formation_gnc.control.linear import LinearController
 from formation_gnc.control.lqr import STRETCHES, LinearQuadraticRegulator, LqrParameters
 from formation_gnc.control.models import DESIGN_MODELS
 from formation_gnc.control.night import Night
@@ -272,11 +274,23 @@ class ModelPredictiveController(Controller):
             **SETTINGS,
         )
 
-    @property
-    def size(self) -> tuple[int, int, int]:
-        """Variables, constraints and stored entries of the quadratic programme."""
+    def figures(self) -> dict[str, Any]:
+        """The horizon, the size of the quadratic programme, and the gain that it becomes without limits."""
         rows, variables = self._rows.shape
-        return variables, rows, self._rows.nnz + len(self._hessian(self._programmes[0]))
+        parameters = self._parameters
+        return {
+            "horizon [s]": parameters.step * parameters.horizon,
+            "steps": parameters.horizon,
+            "steps with thrust": self._steps,
+            "variables": variables,
+            "constraints": rows,
+            "entries of Hessian and constraints": self._rows.nnz + len(self._hessian(self._programmes[0])),
+            **self.reserve.figures(),
+        }
+
+    def linear(self, time: int) -> LinearController:
+        """The LQR that it becomes without active limits."""
+        return self.reserve.linear(time)
 
     def _hessian(self, programme: Programme) -> Vector:
         return np.concatenate([programme.hessian, self._hessian_rest])

@@ -1,6 +1,7 @@
 """What a design is, before it flies: gains, poles, margins, bounds and sizes, as numbers and as a picture."""
 
 from dataclasses import dataclass, field
+from functools import reduce
 from math import asin, inf
 from pathlib import Path
 from typing import Any
@@ -10,21 +11,26 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from formation_gnc.control.controller import Controller, Vehicle
-from formation_gnc.control.hinf import HInfinityController
-from formation_gnc.control.lqr import LinearQuadraticRegulator
-from formation_gnc.control.mixed_sensitivity import LinearController
+from formation_gnc.control.linear import LinearController
 from formation_gnc.control.models import DESIGN_MODELS
-from formation_gnc.control.mpc import ModelPredictiveController
 from formation_gnc.control.registry import ALGORITHMS
-from formation_gnc.interface import Matrix, Vector
+from formation_gnc.interface import NANOSECONDS, Matrix, Vector
+from formation_gnc.relative.model import RelativeModel
 
 FREQUENCIES = 200
 """Frequencies at which singular values are taken, up to half the sampling rate."""
 
+PLACES = 360
+"""Places of the orbit at which a loop that varies along it is closed."""
+
 
 @dataclass(frozen=True)
 class Design:
-    """A designed law, looked at from outside; its loop is the sampled one, without limits."""
+    """A designed law, looked at from outside; its loop is the sampled one, without limits.
+
+    A loop that varies along the orbit has characteristic exponents for poles; its singular values and margins
+    are those of the loop as it is at the start.
+    """
 
     algorithm: str
     figures: dict[str, Any]
@@ -34,7 +40,7 @@ class Design:
     frequency: Vector = field(default_factory=lambda: np.empty(0))
     """(N,) rad/s."""
     singular_values: dict[str, Matrix] = field(default_factory=dict)
-    """Name and (N, 3) singular values; "1 / ..." are the bounds that gamma allows them."""
+    """Name and (N, 3) singular values; "gamma / ..." are bounds."""
     recovery: Matrix = field(default_factory=lambda: np.empty((0, 4)))
     """(N, 4) time, s, and position error, m, after an offset of 1 m in every axis."""
 
@@ -45,72 +51,50 @@ def design(parameters: Any) -> Design:
     Raises:
         ConfigurationError: it cannot be designed.
     """
-    name = parameters.algorithm
+    name, tick = parameters.algorithm, parameters.tick
     own = getattr(parameters, name)
     law = ALGORITHMS[name](own, parameters, Vehicle(parameters.mass, np.array(parameters.thrust_limit)))
-    figures = _figures(law, own, parameters.mass)
-    controller = _linear(law)
+    figures = law.figures()
+    controller = law.linear(0)
     if controller is None:
         return Design(name, figures)
-    tick = parameters.tick
-    phi, gamma = DESIGN_MODELS[own.model](parameters).discretise(0.0, tick)
-    loop = controller.closed_loop(phi, gamma)
-    poles = np.log(np.linalg.eigvals(loop).astype(complex)) / tick
+    model = DESIGN_MODELS[own.model](parameters)
+    loops, repeats = _loops(law, model, tick)
+    turn = reduce(
+        lambda before, loop: np.linalg.matrix_power(loop, repeats) @ before, loops, np.eye(len(loops[0]))
+    )
+    poles = np.log(np.linalg.eigvals(turn).astype(complex)) / (tick * repeats * len(loops))
     poles = poles[np.argsort(-poles.real)]
     frequency = np.geomspace(1e-2 * parameters.mean_motion, np.pi / tick, FREQUENCIES)
-    values = _input_loop(controller, phi, gamma, frequency * tick)
+    values = _input_loop(controller, *model.discretise(0.0, tick), frequency * tick)
     figures |= _margins(values) | {"slowest time constant [s]": _or_none(-1.0 / poles.real.max())}
-    if isinstance(law, HInfinityController):
-        values |= law.problem.singular_values(law.continuous, frequency)
-        values["1 / w_P"] = law.gamma / law.problem.performance.at(frequency)
-        values["1 / w_T"] = law.gamma / law.problem.uncertainty.at(frequency)
-        figures |= {f"largest {each}": float(values[each].max()) for each in ("S", "T")}
-        figures["largest KS [N/m]"] = parameters.mass * float(values["KS"].max())
-    return Design(name, figures, poles, frequency, values, _recovery(loop, tick, poles))
+    own_values = law.singular_values(frequency)
+    figures |= {f"largest {key}": float(each.max()) for key, each in own_values.items() if not _is_bound(key)}
+    return Design(
+        name, figures, poles, frequency, values | own_values, _recovery(loops, repeats, tick, poles)
+    )
+
+
+def _is_bound(name: str) -> bool:
+    return name.startswith("gamma /")
+
+
+def _loops(law: Controller, model: RelativeModel, tick: float) -> tuple[list[Matrix], int]:
+    """Loops closed over a tick, at one place of the orbit or at `PLACES`, and for how many ticks each
+    stands."""
+    places = 1 if model.is_time_invariant else PLACES
+    repeats = 1 if model.is_time_invariant else max(1, round(model.period / places / tick))
+    loops = []
+    for place in range(places):
+        time = (place + 0.5) * repeats * tick if places > 1 else 0.0
+        controller = law.linear(round(time * NANOSECONDS))
+        assert controller is not None, "a law that is linear once always is"
+        loops.append(controller.closed_loop(*model.discretise(time, tick)))
+    return loops, repeats
 
 
 def _or_none(value: float) -> float | None:
     return float(value) if np.isfinite(value) and value > 0.0 else None
-
-
-def _figures(law: Controller, own: Any, mass: float) -> dict[str, Any]:
-    if isinstance(law, LinearQuadraticRegulator):
-        return {
-            "gain [N/m, N/(m/s), N/(m s)]": (mass * law.gain).tolist(),
-            "gains along the orbit": len(law.gains),
-        }
-    if isinstance(law, HInfinityController):
-        return {
-            "best gamma": law.best_gamma,
-            "gamma": law.gamma,
-            "states": len(law.sampled.a),
-            "controller poles [1/s]": sorted(np.linalg.eigvals(law.continuous.a).real.tolist()),
-        }
-    if isinstance(law, ModelPredictiveController):
-        variables, rows, entries = law.size
-        return {
-            "horizon [s]": own.step * own.horizon,
-            "steps": own.horizon,
-            "variables": variables,
-            "constraints": rows,
-            "entries of Hessian and constraints": entries,
-            "gain without limits [N/m, N/(m/s)]": (mass * law.reserve.gain).tolist(),
-        }
-    return {}
-
-
-def _linear(law: Controller) -> LinearController | None:
-    """The law without limits, per tick; a gain along the orbit as its mean, MPC as the LQR it becomes."""
-    if isinstance(law, HInfinityController):
-        return law.sampled
-    if isinstance(law, ModelPredictiveController):
-        law = law.reserve
-    if not isinstance(law, LinearQuadraticRegulator):
-        return None
-    gain = law.gain
-    integral = np.eye(gain.shape[1] - 6)
-    inputs = law.tick * np.eye(len(integral), 6)
-    return LinearController(integral, inputs, -gain[:, 6:], -gain[:, :6])
 
 
 def _input_loop(controller: LinearController, phi: Matrix, gamma: Matrix, angle: Vector) -> dict[str, Matrix]:
@@ -146,15 +130,15 @@ def _margins(values: dict[str, Matrix]) -> dict[str, Any]:
     }
 
 
-def _recovery(loop: Matrix, tick: float, poles: Vector) -> Matrix:
+def _recovery(loops: list[Matrix], repeats: int, tick: float, poles: Vector) -> Matrix:
     slowest = -1.0 / poles.real.max()
     steps = int(min(max(6.0 * slowest / tick, 10.0), 20_000.0)) if slowest > 0.0 else 1000
-    state = np.zeros(len(loop))
+    state = np.zeros(len(loops[0]))
     state[:3] = 1.0
     rows = np.empty((steps, 4))
     for step in range(steps):
         rows[step] = step * tick, *state[:3]
-        state = loop @ state
+        state = loops[step // repeats % len(loops)] @ state
     return rows
 
 
@@ -164,7 +148,7 @@ def draw(designed: Design, path: Path) -> Path:
     FigureCanvasAgg(figure)
     values, plane, time = figure.subplots(1, 3)
     for index, (name, curve) in enumerate(designed.singular_values.items()):
-        style = "--" if name.startswith("1 /") else "-"
+        style = "--" if _is_bound(name) else "-"
         colour = f"C{index}"
         values.loglog(designed.frequency, curve.max(axis=1), style, color=colour, label=name)
     values.set(xlabel="frequency [rad/s]", ylabel="largest singular value", title=designed.algorithm)

@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 
 from formation_gnc.control.autopilot import ControllerParameters
+from formation_gnc.control.controller import Vehicle
+from formation_gnc.control.models import DESIGN_MODELS
+from formation_gnc.control.registry import ALGORITHMS
 from formation_gnc.control.report import design, draw
 from formation_gnc.parameters import load
 
@@ -16,12 +19,13 @@ def described(**values):
     )
 
 
-@pytest.mark.parametrize("algorithm", ["coast", "lqr", "hinf", "mpc"])
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
 def test_every_law_is_described_and_drawn(algorithm, tmp_path):
     designed = described(algorithm=algorithm, lqr__integral_error=3000.0)
     json.dumps(designed.figures)
     assert draw(designed, tmp_path / "design.png").stat().st_size > 10_000
-    if algorithm != "coast":
+    assert (len(designed.poles) > 0) == (len(designed.recovery) > 0)
+    if len(designed.poles):
         assert designed.poles.real.max() < 0.0
         assert np.abs(designed.recovery[-1, 1:]).max() < 0.1
         assert np.abs(designed.recovery[0, 1:] - 1.0).max() == 0.0
@@ -40,17 +44,39 @@ def test_lqr_margins_are_those_that_theory_promises():
 @pytest.mark.parametrize("changes", [{}, {"lqr__integral_error": 3000.0}, {"algorithm": "hinf"}])
 def test_the_loop_stays_stable_up_to_the_gain_margin(changes):
     # The same thing from the other side: scale the thrust and close the loop.
-    from formation_gnc.control import report
-
     parameters = load(ControllerParameters, VALUES | {k.replace("__", "."): v for k, v in changes.items()})
     own = getattr(parameters, parameters.algorithm)
-    law = report.ALGORITHMS[parameters.algorithm](own, parameters, report.Vehicle(100.0, np.full(3, 0.01)))
-    margins, controller = design(parameters).figures, report._linear(law)
-    phi, gamma = report.DESIGN_MODELS[own.model](parameters).discretise(0.0, parameters.tick)
+    law = ALGORITHMS[parameters.algorithm](own, parameters, Vehicle(100.0, np.full(3, 0.01)))
+    margins, controller = design(parameters).figures, law.linear(0)
+    phi, gamma = DESIGN_MODELS[own.model](parameters).discretise(0.0, parameters.tick)
     for share in np.linspace(
         margins["gain margin, down"] * 1.01, min(margins["gain margin, up"] or 20.0, 20.0) * 0.99, 12
     ):
         assert np.abs(np.linalg.eigvals(controller.closed_loop(phi, gamma * share))).max() < 1.0
+
+
+def test_hinf_keeps_its_bounds_in_the_picture():
+    values = described(algorithm="hinf").singular_values
+    for name, bound in {"S": "gamma / w_P", "T": "gamma / w_T", "KS [N/m]": "gamma / w_u [N/m]"}.items():
+        assert (values[name].max(axis=1) <= values[bound].min(axis=1)).all()
+
+
+def test_a_loop_along_the_orbit_has_characteristic_exponents():
+    # Every gain stabilises the model as it is at its place; only over a revolution is that one loop. On a
+    # circular orbit the exponents are the poles of the loop that does not vary.
+    circular = described(algorithm="lqr", lqr__model="tschauner_hempel", lqr__gain="periodic")
+    constant = described(algorithm="lqr")
+    np.testing.assert_allclose(circular.poles.real, constant.poles.real, rtol=1e-3)
+    np.testing.assert_allclose(circular.recovery[:200], constant.recovery[:200], atol=1e-3)
+    eccentric = described(
+        algorithm="lqr",
+        lqr__model="tschauner_hempel",
+        lqr__gain="periodic",
+        chief__semi_major_axis=1e7,
+        chief__eccentricity=0.3,
+    )
+    assert eccentric.poles.real.max() < 0.0
+    assert np.abs(eccentric.recovery[-1, 1:]).max() < 0.1
 
 
 def test_the_size_of_the_programme():
