@@ -11,6 +11,7 @@ from numpy.linalg import LinAlgError
 
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
 from formation_gnc.control.lqr import LinearQuadraticRegulator, LqrParameters
+from formation_gnc.control.weights import QuadraticWeights
 from formation_gnc.errors import ConfigurationError, DesignError
 from formation_gnc.interface import NANOSECONDS, Estimate, Matrix, Target, Vector
 from formation_gnc.mission import Mission
@@ -55,10 +56,10 @@ class Task:
     """Number of equal steps over which the plan holds its thrust."""
     guess: Matrix | None = None
     """(steps, 3) what is left of the plan before, m/s^2; none for the first."""
-    effort: Vector = field(default_factory=lambda: np.ones(3))
-    """(3,) weight of each axis: the plan minimises the integral of sum(effort * acceleration^2) ..."""
-    slack: Vector = field(default_factory=lambda: np.zeros(6))
-    """(6,) ... plus sum(error^2 / slack) of the state at the final time; zero allows no error."""
+    effort: Matrix = field(default_factory=lambda: np.eye(3))
+    """(3, 3) weight R: the plan minimises the integral of a' R a over the acceleration ..."""
+    slack: Matrix = field(default_factory=lambda: np.zeros((6, 6)))
+    """(6, 6) ... plus e' S^-1 e of the error at the final time; zero allows none."""
 
     @property
     def step(self) -> float:
@@ -94,8 +95,8 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class FiniteHorizonParameters:
-    """Time, schedule of plans, and weights by Bryson's rule."""
+class FiniteHorizonParameters(QuadraticWeights):
+    """Weights, model, time and schedule of plans."""
 
     model: str = parameter(
         "oblate",
@@ -131,32 +132,8 @@ class FiniteHorizonParameters:
         0.0,
         minimum=0.0,
         in_flight=True,
-        doc="share of position_error and velocity_error at the final time that costs as much as `thrust` all "
-        "the way; 0 allows none",
-    )
-    position_error: tuple[float, ...] = parameter(
-        (1.0, 1.0, 1.0),
-        unit="m",
-        length=3,
-        above=0.0,
-        in_flight=True,
-        doc="position error that weighs one, per Hill axis",
-    )
-    velocity_error: tuple[float, ...] = parameter(
-        (0.01, 0.01, 0.01),
-        unit="m/s",
-        length=3,
-        above=0.0,
-        in_flight=True,
-        doc="velocity error that weighs one, per Hill axis",
-    )
-    thrust: tuple[float, ...] = parameter(
-        (0.01, 0.01, 0.01),
-        unit="N",
-        length=3,
-        above=0.0,
-        in_flight=True,
-        doc="force that weighs one, per Hill axis",
+        doc="error at the final time, in sizes that weigh one, that costs as much as `thrust` all the way; 0 "
+        "allows none",
     )
     feed_forward: str = parameter(
         "none",
@@ -213,19 +190,12 @@ class FiniteHorizonController(Controller):
                 f"final_time is {parameters.final_time} s in steps of {parameters.step} s; "
                 f"it must be at most {MOST_STEPS} steps"
             )
-        self.holding = LinearQuadraticRegulator(
-            LqrParameters(
-                position_error=parameters.position_error,
-                velocity_error=parameters.velocity_error,
-                thrust=parameters.thrust,
-                feed_forward=parameters.feed_forward,
-            ),
-            mission,
-            vehicle,
-        )
-        error = np.array(parameters.position_error + parameters.velocity_error)
-        self._slack = (parameters.terminal_error * error) ** 2
-        self._effort = (vehicle.mass / np.array(parameters.thrust)) ** 2 / parameters.final_time
+        holding = LqrParameters(feed_forward=parameters.feed_forward, **parameters.weights())
+        self.holding = LinearQuadraticRegulator(holding, mission, vehicle)
+        self._effort = vehicle.mass**2 * parameters.thrust_matrix() / parameters.final_time
+        self._slack = np.zeros((6, 6))
+        if parameters.terminal_error > 0.0:
+            self._slack = parameters.terminal_error**2 * np.linalg.pinv(parameters.state_matrix())
         self._flight: _Flight | None = None
         self._target: Target | None = None
 

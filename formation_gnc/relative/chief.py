@@ -5,8 +5,9 @@
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -29,40 +30,40 @@ STEPS_PER_TURN = 200
 
 @dataclass(frozen=True)
 class ChiefState:
-    """Where the chief is and how its Hill frame turns, at one instant."""
+    """Where the chief is and how its Hill frame turns, at one instant, or, in arrays (...,), at many."""
 
     mu: float
     """Gravitational parameter, m^3/s^2."""
-    radius: float
+    radius: Any
     """Distance from the Earth's centre, m."""
-    angular_rate: float
+    angular_rate: Any
     """Rate of the Hill frame about the orbit normal, h / r^2, rad/s (Joshi 3.25)."""
-    angular_acceleration: float
+    angular_acceleration: Any
     """Its rate of change, rad/s^2 (Joshi 3.26)."""
     pole: Array
-    """(3,) direction of the Earth's axis in the Hill frame: [sin i sin u, sin i cos u, cos i]."""
-    tilt_rate: float = 0.0
+    """(..., 3) direction of the Earth's axis in the Hill frame: [sin i sin u, sin i cos u, cos i]."""
+    tilt_rate: Any = 0.0
     """Rate of the Hill frame about the radial axis, r a_z / h, rad/s: zero unless the orbit plane turns."""
 
 
 def frame_matrix(chief: ChiefState) -> Array:
-    """(6, 6) part of A that comes from the turning of the Hill frame alone, without any gravity.
+    """(..., 6, 6) part of A that comes from the turning of the Hill frame alone, without any gravity.
 
     Its in-plane rates are those of Joshi (3.22). The tilt of the orbit plane, which J2 causes, enters because
     the relative velocity of `formation_gnc.orbit.frames` leaves it out: docs/theory/relative-motion.md.
     """
     rate, tilt = chief.angular_rate, chief.tilt_rate
-    matrix = np.zeros((6, 6))
-    matrix[:3, 3:] = np.eye(3)
-    matrix[3, 0] = matrix[4, 1] = rate**2
-    matrix[3, 1] = chief.angular_acceleration
-    matrix[4, 0] = -chief.angular_acceleration
-    matrix[3, 4] = 2.0 * rate
-    matrix[4, 3] = -2.0 * rate
-    matrix[1, 2] = matrix[4, 5] = tilt
-    matrix[2, 1] = matrix[5, 4] = -tilt
-    matrix[3, 2] = rate * tilt
-    matrix[5, 0] = -rate * tilt
+    matrix = np.zeros((*np.shape(rate), 6, 6))
+    matrix[..., :3, 3:] = np.eye(3)
+    matrix[..., 3, 0] = matrix[..., 4, 1] = rate**2
+    matrix[..., 3, 1] = chief.angular_acceleration
+    matrix[..., 4, 0] = -chief.angular_acceleration
+    matrix[..., 3, 4] = 2.0 * rate
+    matrix[..., 4, 3] = -2.0 * rate
+    matrix[..., 1, 2] = matrix[..., 4, 5] = tilt
+    matrix[..., 2, 1] = matrix[..., 5, 4] = -tilt
+    matrix[..., 3, 2] = rate * tilt
+    matrix[..., 5, 0] = -rate * tilt
     return matrix
 
 
@@ -72,6 +73,16 @@ class Chief(ABC):
     @abstractmethod
     def at(self, time: float) -> ChiefState:
         """State at a time (s)."""
+
+    def along(self, times: Array) -> ChiefState:
+        """States at times (N,), in arrays."""
+        states = [self.at(float(time)) for time in times]
+        columns = {
+            each.name: np.array([getattr(state, each.name) for state in states])
+            for each in fields(ChiefState)
+            if each.name != "mu"
+        }
+        return ChiefState(mu=states[0].mu, **columns)
 
     @property
     @abstractmethod

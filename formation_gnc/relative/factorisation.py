@@ -2,7 +2,8 @@
 
 Joshi's SDC1 and SDC2, and SDC1 with J2: the matrices that the state-dependent Riccati equation works with.
 They are factorisations to rounding error at every state, the chief itself included: where the source sums a
-truncated series, the closed form of the series stands here. All take states (..., 6) and give (..., 6, 6).
+truncated series, the closed form of the series stands here. All take states (..., 6) with one state of the
+chief, or one each, and give (..., 6, 6).
 """
 
 import numpy as np
@@ -18,12 +19,13 @@ def sdc1(state: Array, chief: ChiefState) -> Array:
     Where the chief's plane tilts under J2, the frame's motion includes it.
     """
     state = np.asarray(state)
-    gradient, ratio = _growth(state, chief.radius)
+    radius = np.asarray(chief.radius)
+    gradient, ratio = _growth(state, radius)
     matrix = np.broadcast_to(frame_matrix(chief), (*state.shape, 6)).copy()
-    attraction = (chief.mu / (chief.radius * ratio) ** 3)[..., None]
+    attraction = (chief.mu / (radius * ratio) ** 3)[..., None]
     matrix[..., [3, 4, 5], [0, 1, 2]] -= attraction
     # mu / r^2 - mu r / d^3 = -(mu / r^2) (s^-3 - 1), with s = d / r
-    matrix[..., 3, :3] -= chief.mu / chief.radius**2 * _power_difference(ratio, 3) * gradient
+    matrix[..., 3, :3] -= chief.mu / radius[..., None] ** 2 * _power_difference(ratio, 3) * gradient
     return matrix
 
 
@@ -35,13 +37,13 @@ def sdc2(state: Array, chief: ChiefState) -> Array:
     over the columns of x, y and z instead, which is the same f(x).
     """
     state = np.asarray(state)
-    rate = chief.angular_rate
-    gradient, ratio = _growth(state, chief.radius)
+    rate, radius = np.asarray(chief.angular_rate), np.asarray(chief.radius)
+    gradient, ratio = _growth(state, radius)
     sigma_z = ratio**-3
     sigma_y = -_power_difference(ratio, 3) * gradient  # (..., 3): sigma_y = 1 - s^-3 = this times [x, y, z]
     matrix = np.zeros((*state.shape, 6))
     matrix[..., [0, 1, 2], [3, 4, 5]] = 1.0
-    matrix[..., 3, :3] = rate**2 * (chief.radius + state[..., 0, None]) * sigma_y
+    matrix[..., 3, :3] = (rate**2 * (radius + state[..., 0]))[..., None] * sigma_y
     matrix[..., 3, 4] = 2.0 * rate
     matrix[..., 4, 3] = -2.0 * rate
     matrix[..., 4, 1] = rate**2 * (1.0 - sigma_z)
@@ -64,25 +66,26 @@ def oblateness(state: Array, chief: ChiefState) -> Array:
     is a row vector times [x, y, z].
     """
     state = np.asarray(state)
-    r, pole = chief.radius, chief.pole
+    pole, r = chief.pole, np.asarray(chief.radius)
     gradient, ratio = _growth(state, r)
-    place = state[..., :3] + np.array([r, 0.0, 0.0])
-    d5, d7 = ((r * ratio) ** -5.0)[..., None, None], ((r * ratio) ** -7.0)[..., None, None]
+    r = r[..., None]
+    place = state[..., :3] + r * np.array([1.0, 0.0, 0.0])
+    distance = r * ratio[..., None]
     fifth = r**-5 * _power_difference(ratio, 5) * gradient  # d^-5 - r^-5 = this times [x, y, z]
     seventh = r**-7 * _power_difference(ratio, 7) * gradient
-    height, height_of_chief = (place @ pole)[..., None], r * pole[0]
+    height, height_of_chief = np.sum(place * pole, axis=-1, keepdims=True), r * pole[..., :1]
     square = height**2 * seventh + r**-7 * (height + height_of_chief) * pole  # of Z^2 d^-7
     radial = np.zeros((*state.shape[:-1], 3, 3))
     radial[..., 0, :] = r * (fifth - 5.0 * square)
-    polar = 2.0 * pole[:, None] * (height * fifth + r**-5 * pole)[..., None, :]
-    isotropic = (d5 - 5.0 * height[..., None] ** 2 * d7) * np.eye(3)
+    polar = 2.0 * pole[..., :, None] * (height * fifth + r**-5 * pole)[..., None, :]
+    isotropic = (distance**-5 - 5.0 * height**2 * distance**-7)[..., None] * np.eye(3)
     result: Array = -1.5 * J2 * chief.mu * EARTH_RADIUS**2 * (isotropic + radial + polar)
     return result
 
 
-def _growth(state: Array, radius: float) -> tuple[Array, Array]:
+def _growth(state: Array, radius: Array) -> tuple[Array, Array]:
     """Row vector c (..., 3) with c [x, y, z] = (d / r)^2 - 1, Joshi's -xi; ratio s = d / r (...,)."""
-    gradient = state[..., :3] / radius**2
+    gradient = state[..., :3] / radius[..., None] ** 2
     gradient[..., 0] += 2.0 / radius
     ratio = np.sqrt(1.0 + np.sum(gradient * state[..., :3], axis=-1))
     return gradient, ratio

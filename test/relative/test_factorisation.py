@@ -138,3 +138,13 @@ def test_pole_of_an_integrated_chief_is_the_earths_axis():
     here = chief.at(1234.0)
     assert isinstance(here, ChiefState)
     np.testing.assert_allclose(hill_rotation(chief.inertial(1234.0)) @ [0.0, 0.0, 1.0], here.pole, atol=1e-15)
+
+
+@pytest.mark.parametrize("factorise", [sdc1, sdc2, sdc1_oblate])
+def test_many_states_with_a_chief_each_are_one_by_one_the_same(factorise):
+    chief = OblateChief(Elements(8.0e6, 0.1, 0.9, 0.3, 0.4, 0.5))
+    times = np.linspace(0.0, 5000.0, 7)
+    states = np.random.default_rng(3).standard_normal((7, 6)) * np.repeat([5e4, 50.0], 3)
+    together = factorise(states, chief.along(times))
+    one_by_one = [factorise(state, chief.at(time)) for state, time in zip(states, times, strict=True)]
+    np.testing.assert_allclose(together, one_by_one, rtol=1e-14, atol=0.0)
