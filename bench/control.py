@@ -1,13 +1,13 @@
 """Compute per tick of the control laws; MPC beside the bare solver, and others, on the same programmes."""
 
-import importlib
-import importlib.util
 from collections.abc import Callable
 from time import thread_time
 from typing import Any
 
+import daqp
 import numpy as np
 import osqp
+import piqp
 from numpy.typing import NDArray
 
 from bench.result import Result
@@ -81,39 +81,23 @@ def solve_all(asked: list[dict[str, Any]], solve: Callable[[dict[str, Any]], Any
 
 
 def others(matrices: tuple[Any, Any]) -> dict[str, Callable[[dict[str, Any]], Any]]:
-    """The other solvers that are installed, each from a cold start."""
+    """Other solvers by name, each from a cold start."""
     upper = matrices[0].toarray()
     hessian = upper + np.triu(upper, 1).T
-    rows = matrices[1].toarray()
-    solvers: dict[str, Callable[[dict[str, Any]], Any]] = {}
-    if importlib.util.find_spec("daqp"):
-        daqp = importlib.import_module("daqp")
+    kinds = np.zeros(matrices[1].shape[0], dtype=np.intc)
+    nothing = np.empty((0, len(hessian)))
+    interior = piqp.DenseSolver()
+    bounds = np.ones(len(hessian))
+    interior.setup(hessian, 0.0 * bounds, None, None, None, None, None, -bounds, bounds)
 
-        kinds = np.zeros(len(rows), dtype=np.intc)
+    def with_piqp(values: dict[str, Any]) -> Any:
+        interior.update(c=values["q"], x_l=values["l"], x_u=values["u"])
+        return interior.solve()
 
-        def with_daqp(values: dict[str, Any]) -> Any:
-            return daqp.solve(
-                hessian, values["q"], np.empty((0, len(hessian))), values["u"], values["l"], kinds
-            )
-
-        solvers["DAQP"] = with_daqp
-    if importlib.util.find_spec("piqp"):
-        piqp = importlib.import_module("piqp")
-
-        solver = piqp.DenseSolver()
-        started = False
-
-        def with_piqp(values: dict[str, Any]) -> Any:
-            nonlocal started
-            if not started:
-                solver.setup(hessian, values["q"], None, None, None, None, None, values["l"], values["u"])
-                started = True
-            else:
-                solver.update(c=values["q"], x_l=values["l"], x_u=values["u"])
-            return solver.solve()
-
-        solvers["PIQP"] = with_piqp
-    return solvers
+    return {
+        "DAQP": lambda values: daqp.solve(hessian, values["q"], nothing, values["u"], values["l"], kinds),
+        "PIQP": with_piqp,
+    }
 
 
 def run() -> list[Result]:
