@@ -94,6 +94,10 @@ class Estimate:
     blind: str = ""
 
 
+NO_ECLIPSE: Matrix = np.empty((0, 2))
+NOBODY: Matrix = np.empty((0, 6))
+
+
 @dataclass(slots=True)
 class Target:
     """Relative state that a deputy is to have, now and over the horizon."""
@@ -103,6 +107,8 @@ class Target:
     relative_state: Vector  # (6,)
     preview_step: float
     preview: Matrix = field(metadata={"shape": (-1, 6)})
+    eclipse: Matrix = field(default_factory=lambda: NO_ECLIPSE, metadata={"shape": (-1, 2)})
+    others: Matrix = field(default_factory=lambda: NOBODY, metadata={"shape": (-1, 6)})
 
 
 @dataclass(slots=True)

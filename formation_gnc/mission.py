@@ -32,6 +32,11 @@ class Mission:
     tick: float = parameter(
         1.0, unit="s", above=0.0, maximum=LAST_SECOND, doc="time between ticks; a whole number of nanoseconds"
     )
+    epoch: float = parameter(
+        0.0,
+        unit="s",
+        doc="Terrestrial Time at the start of the run since J2000.0; it places Sun, Moon and Greenwich",
+    )
 
     def __post_init__(self) -> None:
         """Raise ConfigurationError for a tick that nanosecond stamps cannot carry exactly."""

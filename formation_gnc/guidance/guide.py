@@ -12,13 +12,18 @@ from formation_gnc.errors import ConfigurationError
 from formation_gnc.guidance.registry import FORMATIONS
 from formation_gnc.guidance.targets import TARGET_MODELS, TargetPath
 from formation_gnc.guidance.transfer import LONGEST, shortest_time
-from formation_gnc.interface import NANOSECONDS, Estimate, Target, Vector
+from formation_gnc.interface import NANOSECONDS, NO_ECLIPSE, Estimate, Matrix, Target, Vector
 from formation_gnc.mission import LAST_SECOND
+from formation_gnc.orbit.eclipse import eclipses
+from formation_gnc.orbit.propagation import ImpactError
 from formation_gnc.parameters import parameter
 from formation_gnc.part import Configuration, Part, Schedulable
 
 LARGEST_ERROR = 0.05
 """Error of the target's model in a revolution, as a share of the formation's size, above which it is told."""
+
+ECLIPSE_STEPS = 180
+"""Points of a revolution at which the chief is looked at for eclipses."""
 
 OUT_OF_REACH = 1e9
 """Distance (m) from the chief that is no formation any more."""
@@ -87,6 +92,10 @@ class Guide(Part[Any, TargetPath]):
         self._left: str | None = None
         self._until = 0
 
+    def forget(self) -> None:
+        """No eclipse has been looked for yet."""
+        self._eclipse, self._eclipse_looked_for = NO_ECLIPSE, -LAST_SECOND * NANOSECONDS
+
     def design(self, parameters: Any) -> TargetPath:
         """The path of the named formation's place, with its own parameters, in the named model."""
         kind, own = FORMATIONS[parameters.formation], getattr(parameters, parameters.formation)
@@ -146,8 +155,32 @@ class Guide(Part[Any, TargetPath]):
             if self._left is not None:
                 self._tell_of_the_change(estimate, states[0])
         return Target(
-            estimate.time, self.parameters.formation, states[0], self.parameters.preview_step, states[1:]
+            estimate.time,
+            self.parameters.formation,
+            states[0],
+            self.parameters.preview_step,
+            states[1:],
+            self._coming_eclipse(estimate),
         )
+
+    def _coming_eclipse(self, estimate: Estimate) -> Matrix:
+        """Eclipses of the chief, looked for two revolutions ahead in every revolution."""
+        revolution = math.tau / self.parameters.mean_motion
+        seconds = estimate.time / NANOSECONDS
+        if estimate.time - self._eclipse_looked_for >= revolution * NANOSECONDS:
+            self._eclipse_looked_for = estimate.time
+            try:
+                self._eclipse = seconds + eclipses(
+                    estimate.chief_state,
+                    2.0 * revolution,
+                    revolution / ECLIPSE_STEPS,
+                    self.parameters.epoch + seconds,
+                )
+            except ImpactError:  # the estimate's chief flies nowhere: nothing is known
+                self._eclipse = NO_ECLIPSE
+        while len(self._eclipse) and self._eclipse[0, 1] <= seconds:
+            self._eclipse = self._eclipse[1:]
+        return self._eclipse
 
     def _tell_of_the_model(self, time: int) -> None:
         error, size = self.configuration.design.error()

@@ -51,11 +51,6 @@ class PlantParameters(Mission):
         above=0.0,
         doc="wall time a deputy has for its answer before it gets no thrust for the tick",
     )
-    epoch: float = parameter(
-        0.0,
-        unit="s",
-        doc="Terrestrial Time at the start of the run since J2000.0; it places Sun, Moon and Greenwich",
-    )
     step: float = parameter(
         10.0, unit="s", above=0.0, doc="longest integration step, of order eight; a longer tick is divided"
     )

@@ -23,6 +23,8 @@ from formation_gnc.parameters import load
 
 Array = NDArray[np.float64]
 
+EQUINOX = (9210 - 0.5) * 86400.0  # s since J2000.0: 20 March 2025, the Sun on the x axis
+
 
 def mission(eccentricity: float = 0.0, anomaly: float = 0.4, inclination: float = 0.9) -> Mission:
     return Mission(Orbit(7.0e6 / (1.0 - eccentricity), eccentricity, inclination, 0.0, 0.3, anomaly))
@@ -238,3 +240,30 @@ def test_two_satellites_on_one_place_are_refused_now_and_later() -> None:
     later = parameters(0, schedule=["{at: 60, slot: 1}"])
     with pytest.raises(ConfigurationError, match=r"a and b are on one place from 60 s"):
         check_places({"a": later, "b": parameters(1)})
+
+
+def test_the_coming_eclipses_come_with_the_target_until_they_are_over() -> None:
+    guided = guide(epoch=EQUINOX)
+    revolution = math.tau / guided.parameters.mean_motion
+    chief = state_from_elements(Elements(7.0e6, 0.0, 0.4, 0.0, 0.0, 0.0))
+
+    def eclipse_at(share: float) -> Array:
+        seconds = share * revolution
+        state = advance_with_transition(chief, np.zeros(3), seconds, 200)[0] if seconds else chief
+        return guided.on_tick(
+            Estimate(
+                round(seconds * NANOSECONDS), np.ones(6), np.eye(6), state, 1.0, False, [], [], [], 0.0, 0
+            )
+        ).eclipse
+
+    first = eclipse_at(0.0)
+    assert len(first) == 2  # two revolutions ahead
+    assert eclipse_at(0.5).tolist() == first.tolist()  # under way
+    assert eclipse_at(0.9).tolist() == first[1:].tolist()
+    again = eclipse_at(1.0)  # looked for anew, from where the chief has come
+    assert len(again) == 2
+    assert again[0] == pytest.approx(first[1], abs=0.1)
+
+
+def test_a_chief_that_flies_nowhere_has_no_eclipse(at: Callable[..., Estimate]) -> None:
+    assert not len(guide().on_tick(at(0.0)).eclipse)
