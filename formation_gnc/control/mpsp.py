@@ -34,14 +34,13 @@ class StaticProgrammingController(FiniteHorizonController):
     def __init__(self, parameters: StaticProgrammingParameters, mission: Mission, vehicle: Vehicle) -> None:
         """Design the law that holds; raises DesignError as every finite horizon."""
         super().__init__(parameters, mission, vehicle)
-        error = np.array(parameters.position_error + parameters.velocity_error)
         self._hill = HillModel(mission.mean_motion)
-        self._cost = np.diag(error**-2.0), np.diag((vehicle.mass / np.array(parameters.thrust)) ** 2)
-        self._tolerance = TOLERANCE * error
+        self._cost = parameters.state_matrix(), vehicle.mass**2 * parameters.thrust_matrix()
+        self._effort[np.diag_indices(3)] += np.where(vehicle.thrust_limit > 0.0, 0.0, np.inf)
+        self._tolerance = TOLERANCE * np.array(parameters.position_error + parameters.velocity_error)
 
     def plan(self, task: Task) -> Plan:
         """The plan of least effort; an axis that has no thrust gets none."""
-        task = replace(task, effort=np.where(self._limit > 0.0, task.effort, np.inf))
         if task.guess is None:
             weights = Weights.scaled(*self._cost, task.step)
             gain = stationary_gain(*self._hill.discretise(0.0, task.step), weights)

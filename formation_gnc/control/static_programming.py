@@ -210,13 +210,20 @@ def _improved(
     With it the terminal error to expect, zero without slack. None when A_lambda is singular, or not finite.
     The sensitivities are per unit of `shares`, s.
     """
-    reach = np.einsum("k,kij,j,klj->il", shares, sensitivity, 1.0 / task.effort, sensitivity)
-    reach += np.diag(task.slack)
+    softened = sensitivity @ _softness(task.effort)
+    reach = np.einsum("k,kij,klj->il", shares, softened, sensitivity) + task.slack
     pull = np.einsum("k,kij,kj->i", shares, sensitivity, history)
     size = np.sqrt(np.diag(reach))
     normal = reach / np.outer(size, size)  # free of units
     if not np.isfinite(normal).all() or np.linalg.eigvalsh(normal)[0] < SINGULAR:
         return None
     multiplier = np.linalg.solve(normal, (pull - error) / size) / size
-    improved: Matrix = np.einsum("kij,i->kj", sensitivity, multiplier) / task.effort
-    return improved, -task.slack * multiplier
+    improved: Matrix = np.einsum("kij,i->kj", softened, multiplier)
+    return improved, -task.slack @ multiplier
+
+
+def _softness(effort: Matrix) -> Matrix:
+    """Inverse (3, 3) of R; zero for an axis without thrust, whose element is infinite."""
+    result, pushes = np.zeros((3, 3)), np.isfinite(np.diag(effort))
+    result[np.ix_(pushes, pushes)] = np.linalg.inv(effort[np.ix_(pushes, pushes)])
+    return result

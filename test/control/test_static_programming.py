@@ -110,7 +110,7 @@ def test_no_neighbour_that_arrives_costs_less():
 
 
 def test_an_axis_without_thrust_gets_none_and_the_others_do_its_work():
-    plan = mpsp(task(50, effort=np.array([np.inf, 1.0, 1.0])), TOLERANCE)
+    plan = mpsp(task(50, effort=np.diag([np.inf, 1.0, 1.0])), TOLERANCE)
     assert not plan.failure
     assert not plan.acceleration[:, 0].any()
     assert effort(plan) > effort(mpsp(task(50), TOLERANCE))
@@ -119,7 +119,7 @@ def test_an_axis_without_thrust_gets_none_and_the_others_do_its_work():
 @pytest.mark.parametrize("method", [mpsp, gmpsp])
 def test_slack_trades_the_terminal_error_against_effort(method):
     hard, slack = method(task(50), TOLERANCE), np.repeat([1e6, 1.0], 3)
-    soft = method(task(50, slack=slack), TOLERANCE)
+    soft = method(task(50, slack=np.diag(slack)), TOLERANCE)
     assert not soft.failure
 
     def cost(plan):
@@ -127,14 +127,14 @@ def test_slack_trades_the_terminal_error_against_effort(method):
 
     assert np.linalg.norm(soft.errors[-1][:3]) > 1.0
     assert cost(soft) < cost(hard)
-    softer = method(task(50, slack=1.01 * slack), TOLERANCE)  # a neighbour, judged by the same cost
+    softer = method(task(50, slack=1.01 * np.diag(slack)), TOLERANCE)  # a neighbour, judged by the same cost
     assert cost(soft) < cost(softer)
 
 
 @pytest.mark.parametrize(
     ("changes", "steps", "reason"),
     [
-        ({"effort": np.array([1.0, 1.0, np.inf])}, 50, "singular"),  # nothing pushes across the track
+        ({"effort": np.diag([1.0, 1.0, np.inf])}, 50, "singular"),  # nothing pushes across the track
         ({"duration": 0.0}, 50, "past by 0 s"),
         ({"duration": -20.0}, 50, "past by 20 s"),
         ({"state": np.array([np.nan, 0, 0, 0, 0, 0])}, 50, "not finite"),
