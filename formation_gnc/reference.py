@@ -1,4 +1,4 @@
-"""Writes the reference page of all parameters: ``python -m formation_gnc.reference`` in a clone."""
+"""Writes what the schemas say into docs/reference, of a clone: ``python -m formation_gnc.reference``."""
 
 from collections.abc import Iterator
 from dataclasses import MISSING
@@ -10,10 +10,13 @@ from formation_gnc.guidance.guide import GuidanceParameters
 from formation_gnc.mission import Mission
 from formation_gnc.navigation.navigator import NavigationParameters
 from formation_gnc.nodes.recorder import RecorderParameters
+from formation_gnc.nodes.replay import ReplayParameters
 from formation_gnc.parameters import Leaf, leaves
 from formation_gnc.plant.plant import PlantParameters
+from formation_gnc.recording.layout import LAYOUT, foxglove_layout
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "reference" / "parameters.md"
+LAYOUT_PAGE = PAGE.with_name(LAYOUT)
 
 SCHEMAS: dict[str, Any] = {
     "plant": PlantParameters,
@@ -21,6 +24,7 @@ SCHEMAS: dict[str, Any] = {
     "guidance": GuidanceParameters,
     "controller": ControllerParameters,
     "recorder": RecorderParameters,
+    "replay": ReplayParameters,
 }
 """Schema of each node."""
 
@@ -78,3 +82,4 @@ def _default(leaf: Leaf) -> str:
 if __name__ == "__main__":
     PAGE.parent.mkdir(parents=True, exist_ok=True)
     PAGE.write_text(page())
+    LAYOUT_PAGE.write_text(foxglove_layout(["deputy1"]))

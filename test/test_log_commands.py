@@ -11,7 +11,7 @@ import pytest
 
 from formation_gnc.analysis.compare import gnc_topics
 from formation_gnc.cli import main
-from formation_gnc.nodes.record_in_process import read_record
+from formation_gnc.nodes.record_in_process import reader
 from formation_gnc.recording.reader import Bag, identical
 from formation_gnc.sil.replay import KINDS, nodes_of, parameters_of, replay
 from formation_gnc.sil.scenario import find_scenario
@@ -160,7 +160,7 @@ def test_swaps_by_schedule_and_by_hand_are_flown_again_at_their_tick(
     replay(
         recorded,
         values,
-        read_record,
+        reader(recorded),
         lambda topic, record: outputs.append((topic, record)),
         lambda topic, data, stamp: said.append((topic, stamp)),
     )

@@ -4,7 +4,8 @@ import pytest
 
 from formation_gnc.nodes import topics
 from formation_gnc.parameters import dump, leaves, load
-from formation_gnc.reference import PAGE, SCHEMAS, page
+from formation_gnc.recording.layout import foxglove_layout
+from formation_gnc.reference import LAYOUT_PAGE, PAGE, SCHEMAS, page
 
 NEEDED = {
     "chief.semi_major_axis": 7.0e6,
@@ -15,6 +16,10 @@ NEEDED = {
 
 def test_the_page_of_parameters_is_up_to_date() -> None:
     assert PAGE.read_text() == page(), "run `python -m formation_gnc.reference` and commit docs/reference"
+
+
+def test_the_layout_for_foxglove_is_up_to_date() -> None:
+    assert LAYOUT_PAGE.read_text() == foxglove_layout(["deputy1"]), "run `python -m formation_gnc.reference`"
 
 
 @pytest.mark.parametrize("node", SCHEMAS)

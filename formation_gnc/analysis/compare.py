@@ -13,18 +13,17 @@ from formation_gnc.analysis.overview import POINTS
 from formation_gnc.interface import Vector
 from formation_gnc.recording.reader import Bag
 
-COMMON_TOPICS = ("/clock", "/truth", "/events")
-DEPUTY_TOPICS = ("measurement", "estimate", "target", "thrust", "status")
+OF_WALL_TIME = "formation_gnc_msgs/msg/Timing"
 
 
 def gnc_topics(*bags: Bag) -> list[str]:
-    """Topics of the bags that the same run fills with the same bits: all but those of wall time."""
-    present = sorted({topic for bag in bags for topic in bag.topics})
-    return [
+    """Topics of the bags that the same run fills with the same bits: the project's own, but for wall time."""
+    types = {topic: each.type_name for bag in bags for topic, each in bag.topics.items()}
+    return sorted(
         topic
-        for topic in present
-        if topic in COMMON_TOPICS or (topic.count("/") == 2 and topic.endswith(DEPUTY_TOPICS))
-    ]
+        for topic, kind in types.items()
+        if topic == "/clock" or (kind.startswith("formation_gnc_msgs/") and kind != OF_WALL_TIME)
+    )
 
 
 def commanded(bag: Bag, deputy: str) -> tuple[Vector, Vector]:

@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Replay, record, compare."""
-    from formation_gnc.nodes.record_in_process import InProcessRecorder, read_record
+    from formation_gnc.nodes.record_in_process import InProcessRecorder, reader
     from formation_gnc.recording.provenance import provenance
     from formation_gnc.recording.writer import BagWriter
 
@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
         replay(
             bag,
             parameters,
-            read_record,
+            reader(bag),
             recorder,
             lambda topic, data, stamp: recorder.copy(bag, topic, data, stamp),
         )

@@ -90,7 +90,11 @@ def _free_directory(name: str) -> Path:
 
 
 def _closed(bag: Path) -> str:
-    return f"bag closed: {bag}" if (bag / "metadata.yaml").exists() else "nothing was recorded"
+    from formation_gnc.recording.reader import Bag
+
+    if not (bag / "metadata.yaml").exists():
+        return "nothing was recorded"
+    return f"bag cut short, to be recovered: {bag}" if Bag(bag).damage else f"bag closed: {bag}"
 
 
 class _Display:
@@ -143,6 +147,7 @@ def _fly_on_graph(scenario: Scenario, bag: Path, console: Console) -> float:
 
 def _fly_in_process(scenario: Scenario, bag: Path, console: Console) -> float:
     from formation_gnc.nodes.record_in_process import InProcessRecorder
+    from formation_gnc.recording.layout import LAYOUT, foxglove_layout
     from formation_gnc.recording.provenance import provenance
     from formation_gnc.recording.writer import BagWriter
 
@@ -156,8 +161,11 @@ def _fly_in_process(scenario: Scenario, bag: Path, console: Console) -> float:
         f"parameters {node}": {name: json.dumps(value) for name, value in values.items()}
         for node, values in scenario.parameters().items()
     }
+    origin = {"run": {"scenario": scenario.name, "seed": str(scenario.plant.seed)}}
+    files = {f"{scenario.name}.yaml": scenario.text(), LAYOUT: foxglove_layout(scenario.plant.deputies)}
+    attachments = {name: text.encode() for name, text in files.items()}
     with (
-        BagWriter(bag, provenance() | parameters) as writer,
+        BagWriter(bag, provenance() | origin | parameters, attachments) as writer,
         _Display(console, scenario.plant.ticks) as display,
     ):
         sink = InProcessRecorder(writer)
@@ -186,6 +194,7 @@ def _summarise(scenario: Scenario, bag: Path, speedup: float, as_json: bool) -> 
             "ticks": result.ticks,
             "misses": result.misses,
             "speedup": speedup,
+            "lost": recorded.lost,
             "bag": str(bag),
             "picture": str(picture),
             "deputies": {name: dataclasses.asdict(each) for name, each in result.deputies.items()},
@@ -213,7 +222,8 @@ def _summarise(scenario: Scenario, bag: Path, speedup: float, as_json: bool) -> 
         table.add_row(escape(label), *values)
     console = Console(highlight=False)
     console.print(table)
-    console.print(f"{result.ticks} ticks, {result.misses} missed, {speedup:,.0f} x real time")
+    lost = f", {recorded.lost} messages not recorded" if recorded.lost else ""
+    console.print(f"{result.ticks} ticks, {result.misses} missed{lost}, {speedup:,.0f} x real time")
     if nearest is not None:
         console.print(
             f"minimum separation {nearest.distance:.1f} m, {' and '.join(nearest.pair)} at {nearest.time:g} s"

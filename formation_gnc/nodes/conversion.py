@@ -3,12 +3,14 @@
 import array
 import dataclasses
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 from formation_gnc_msgs import msg as messages
 
 from formation_gnc import interface
+from formation_gnc.errors import ConfigurationError
 from formation_gnc.interface import NANOSECONDS
 
 _FIELDS: dict[type[Any], "tuple[_Field, ...]"] = {}
@@ -35,6 +37,15 @@ class _Field:
 def message_type(record_type: type[Any]) -> Any:
     """The message class of the same name."""
     return getattr(messages, record_type.__name__)
+
+
+def message_class(type_name: str) -> Any:
+    """The class of a message type such as ``std_msgs/msg/String``; raises ConfigurationError for none."""
+    try:
+        package, kind, name = type_name.split("/")
+        return getattr(import_module(f"{package}.{kind}"), name)
+    except (ImportError, AttributeError, ValueError):
+        raise ConfigurationError(f"message type {type_name!r} is not installed") from None
 
 
 def to_message(record: Any, message: Any = None) -> Any:

@@ -1,6 +1,7 @@
 """Starts a run's node graph as `ros2 run` would, watches it, and stops all of it."""
 
 import ctypes
+import json
 import os
 import signal
 import subprocess
@@ -208,14 +209,14 @@ def fly_graph(
         _noted_interrupts() as raise_if_interrupted,
     ):
         file = Path(directory) / f"{scenario.name}.yaml"
-        recorder = {"/recorder": {"bag": str(bag), **_mission(scenario)}} if bag else {}
-        scenario.write(file, {"/plant": {"wait_for_recorder": bag is not None}, **recorder})
+        recorder = {"/recorder": _mission(scenario)} if bag else {}
+        file.write_text(scenario.text({"/plant": {"wait_for_recorder": bag is not None}, **recorder}))
         announce(f"ROS_DOMAIN_ID={domain}")
         graph = Graph(domain, Path(directory))
         arguments = ["--params-file", str(file)]
         try:
             if bag:
-                graph.start("/recorder", arguments)
+                graph.start("/recorder", [*arguments, "-p", f"bag:={json.dumps(str(bag))}"])
             plant_process = graph.start("/plant", arguments)
             for deputy in scenario.plant.deputies:
                 for part in topics.PARTS:

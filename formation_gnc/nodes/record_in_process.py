@@ -59,19 +59,11 @@ class InProcessRecorder:
         self._bag.write(topic, data, time, self._counts[topic])
 
 
-RECORDS = {
-    "events": interface.Event,
-    "measurement": interface.Measurement,
-    "estimate": interface.Estimate,
-    "target": interface.Target,
-    "thrust": interface.Thrust,
-    "status": interface.Status,
-    "timing": interface.Timing,
-}
-"""Kinds of record by the last word of their topics."""
+def reader(bag: Bag) -> Callable[[str, bytes], Any]:
+    """A function that gives the record which a message of the bag carries, by its topic and CDR bytes."""
 
+    def read(topic: str, data: bytes) -> Any:
+        record = getattr(interface, bag.topics[topic].type_name.rpartition("/")[2])
+        return from_message(record, deserialize_message(data, message_type(record)))
 
-def read_record(topic: str, data: bytes) -> Any:
-    """The record that a message carries, given its topic and CDR bytes."""
-    record = RECORDS[topic.rpartition("/")[2]]
-    return from_message(record, deserialize_message(data, message_type(record)))
+    return read

@@ -1,11 +1,11 @@
 """The recorder node: every topic, byte for byte, into an MCAP bag."""
 
 import json
-import struct
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from importlib import import_module
+from itertools import pairwise
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -13,17 +13,21 @@ from typing import Any
 from rcl_interfaces.msg import ParameterType
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
-from rclpy.qos import QoSDurabilityPolicy
 from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
+from std_srvs.srv import Trigger
 
 from formation_gnc.interface import NANOSECONDS
 from formation_gnc.mission import Mission
 from formation_gnc.nodes import topics
-from formation_gnc.nodes.shell import ConfiguredNode, run
+from formation_gnc.nodes.raw_topics import Hear, RawTopics
+from formation_gnc.nodes.shell import ConfiguredNode, asked_to_stop, run
 from formation_gnc.parameters import parameter
-from formation_gnc.recording.provenance import provenance
-from formation_gnc.recording.writer import FLUSH_INTERVAL, BagWriter
+from formation_gnc.recording.layout import LAYOUT, foxglove_layout
+from formation_gnc.recording.loss import LossCounter
+from formation_gnc.recording.provenance import LOST, provenance
+from formation_gnc.recording.snapshot import Snapshot
+from formation_gnc.recording.writer import FLUSH_INTERVAL, BagWriter, Split
 
 LOOK_PERIOD = 0.1
 """Wall time (s) between looks for new topics and nodes, and between reports of progress."""
@@ -37,35 +41,65 @@ QUIET = 0.2
 
 @dataclass(frozen=True)
 class RecorderParameters(Mission):
-    """Where to record to."""
+    """Where to record to, and how much."""
 
     bag: str = parameter("", doc="directory to make for the bag; empty for bags/ and the date and time")
+    split_size: int = parameter(
+        0, unit="B", minimum=0, doc="messages on disk after which the bag goes on in a next file; 0 for never"
+    )
+    split_duration: float = parameter(
+        0.0,
+        unit="s",
+        minimum=0.0,
+        doc="simulated time after which the bag goes on in a next file; 0 for never",
+    )
+    snapshot: float = parameter(
+        0.0,
+        unit="s",
+        minimum=0.0,
+        doc="record nothing but, whenever the service ~/snapshot is called, this much simulated time up to "
+        "then; 0 for recording everything",
+    )
 
 
 class RecorderNode(ConfiguredNode):
     """Subscribes to every topic there is and writes what comes, as it came.
 
-    Messages are stamped with simulated time: their own header's for the project's messages, the latest
-    tick's for others.
+    failure: why the disk took no more, once that has happened; from then on nothing is recorded.
     """
 
     def __init__(self) -> None:
         """Make the bag; raises ConfigurationError if its directory exists."""
         super().__init__("recorder", RecorderParameters)
-        directory = self.values.bag or f"bags/{datetime.now(UTC):%Y-%m-%d_%H-%M-%S}"
-        self.bag = BagWriter(Path(directory), provenance())
+        values = self.values
+        directory = values.bag or f"bags/{datetime.now(UTC):%Y-%m-%d_%H-%M-%S}"
+        files = _parameter_files(sys.argv)
+        self._scenario = files[0].stem if files else ""
+        self.bag = BagWriter(
+            Path(directory),
+            provenance(),
+            {file.name: file.read_bytes() for file in files},
+            Split(values.split_size or None, values.split_duration or None),
+        )
+        self.failure: OSError | None = None
         self.get_logger().info(f"recording to {directory}")
         self._progress = self.create_publisher(Clock, topics.RECORDED, topics.quality(topics.LATEST))
-        self._topics: set[str] = set()
+        self._write = self.bag.write
+        if values.snapshot:
+            self._snapshot = Snapshot(self.bag, values.snapshot)
+            self._write = self._snapshot.write
+            self.create_service(Trigger, "~/snapshot", self._on_snapshot)
+        self._topics = RawTopics(self, self._open)
         self._counts: dict[str, int] = {}
+        self._losses: dict[str, LossCounter] = {}
+        self._lost = 0
         self._askable: dict[str, AsyncParameterClient] = {}
         self._settings: dict[str, dict[str, Any]] = {}
-        self._time = 0
         self._heard: dict[str, int] = {}
         self._reported: int | None = None
         self._last_message = monotonic()
-        self.create_timer(LOOK_PERIOD, self._look)
-        self.create_timer(FLUSH_INTERVAL, self.bag.flush)
+        self.create_timer(LOOK_PERIOD, self._while_disk_lasts(self._look))
+        self.create_timer(FLUSH_INTERVAL, self._while_disk_lasts(self.bag.flush))
 
     def is_quiet(self) -> bool:
         """Whether nothing has come for a while."""
@@ -73,13 +107,24 @@ class RecorderNode(ConfiguredNode):
 
     def close(self) -> None:
         """Finish the bag."""
-        self.bag.close()
+        if self.failure is None:
+            self.bag.add_metadata(LOST, {topic: str(each.lost) for topic, each in self._losses.items()})
+            self.bag.close()
+
+    def _while_disk_lasts(self, work: Callable[..., None]) -> Callable[..., None]:
+        """Do `work` until the disk fails; an executor would lose the error."""
+
+        def guarded(*arguments: Any) -> None:
+            if self.failure is None:
+                try:
+                    work(*arguments)
+                except OSError as failure:
+                    self.failure = failure
+
+        return guarded
 
     def _look(self) -> None:
-        for topic, (type_name, *_) in self.get_topic_names_and_types():
-            if topic not in self._topics:
-                self._topics.add(topic)
-                self._record(topic, type_name)
+        self._topics.look()
         for service, _ in self.get_service_names_and_types():
             node, _, kind = service.rpartition("/")
             if kind == "get_parameters" and node not in self._askable:
@@ -90,6 +135,7 @@ class RecorderNode(ConfiguredNode):
                 self._ask_parameters(node, client)
         if self._knows_the_run():
             self._report()
+        self._say_what_is_lost()
 
     def _knows_the_run(self) -> bool:
         """Whether the parameters of the plant and of every deputy's nodes are on record."""
@@ -97,39 +143,25 @@ class RecorderNode(ConfiguredNode):
         nodes = [f"/{deputy}/{part}" for deputy in deputies for part in topics.PARTS]
         return bool(nodes) and all(self._settings.get(node) for node in nodes)
 
-    def _record(self, topic: str, type_name: str) -> None:
-        try:
-            package, kind, name = type_name.split("/")
-            message_type = getattr(import_module(f"{package}.{kind}"), name)
-            self.bag.add_topic(topic, type_name, topics.DEPTH)
-        except (ImportError, AttributeError, ValueError) as error:
-            self.get_logger().warning(f"{topic} is not recorded: {type_name} is not installed ({error})")
-            return
+    def _open(self, topic: str, type_name: str, latched: bool) -> Hear:
+        self.bag.add_topic(topic, type_name, topics.DEPTH)
         self._counts[topic] = 0
-        offers = self.get_publishers_info_by_topic(topic)
-        quality = topics.quality()
-        if any(offer.qos_profile.durability == QoSDurabilityPolicy.VOLATILE for offer in offers):
-            quality.durability = QoSDurabilityPolicy.VOLATILE
-        self.create_subscription(message_type, topic, self._receiver(topic, message_type), quality, raw=True)
-
-    def _receiver(self, topic: str, message_type: Any) -> Callable[[bytes], None]:
-        stamped = "std_msgs/Header" in list(message_type.get_fields_and_field_types().values())[:1]
+        loss = self._losses[topic] = LossCounter(lambda: self.count_publishers(topic), latched)
         is_clock = topic == topics.CLOCK
         paced = is_clock or topic == topics.TRUTH or topic.endswith(f"/{topics.MEASUREMENT}")
 
-        def receive(data: bytes) -> None:
+        def hear(data: bytes, stamp: int, number: int | None) -> None:
             self._last_message = monotonic()
-            stamp = _first_stamp(data) if stamped or is_clock else self._time
-            self._counts[topic] += 1
-            self.bag.write(topic, data, stamp, self._counts[topic])
+            count = self._counts[topic] = self._counts[topic] + 1
+            if number is not None:
+                loss.take(number)
+            self._write(topic, data, stamp, number or count)
             if paced:
                 self._heard[topic] = stamp
-            if is_clock:
-                self._time = stamp
-                if self._counts[topic] % REPORT_TICKS == 0:
-                    self._report()
+            if is_clock and count % REPORT_TICKS == 0:
+                self._report()
 
-        return receive
+        return self._while_disk_lasts(hear)
 
     def _report(self) -> None:
         """Tell the plant up to which tick all that it publishes at every tick is recorded."""
@@ -139,6 +171,22 @@ class RecorderNode(ConfiguredNode):
             progress = Clock()
             progress.clock.sec, progress.clock.nanosec = divmod(recorded, NANOSECONDS)
             self._progress.publish(progress)
+
+    def _say_what_is_lost(self) -> None:
+        lost = {topic: each.lost for topic, each in self._losses.items() if each.lost}
+        if sum(lost.values()) > self._lost:
+            self._lost = sum(lost.values())
+            self.get_logger().warning(f"lost so far: {', '.join(f'{n} of {t}' for t, n in lost.items())}")
+
+    def _on_snapshot(self, _request: Any, response: Any) -> Any:
+        def write() -> None:
+            response.message = f"{self._snapshot.trigger()} messages written to {self.bag.directory}"
+            response.success = True
+
+        self._while_disk_lasts(write)()
+        if not response.success:
+            response.message = str(self.failure)
+        return response
 
     def _ask_parameters(self, node: str, client: AsyncParameterClient) -> None:
         """Ask a node for all its parameters, for the record."""
@@ -153,26 +201,34 @@ class RecorderNode(ConfiguredNode):
                 for name, value in zip(names, answer.result().values, strict=True)
                 if value.type != ParameterType.PARAMETER_NOT_SET
             }
-            # at once, so that a bag that is cut short can be flown again
-            recorded = {name: json.dumps(value) for name, value in self._settings[node].items()}
-            self.bag.add_metadata(f"parameters {node}", recorded)
+            self._while_disk_lasts(self._put_on_record)(node, self._settings[node])
 
         client.list_parameters(callback=on_list)
 
+    def _put_on_record(self, node: str, values: dict[str, Any]) -> None:
+        """Write parameters at once, so that a bag that is cut short can be flown again."""
+        here = ("bag",) if node == self.get_fully_qualified_name() else ()  # where, not how, it was recorded
+        recorded = {name: json.dumps(value) for name, value in values.items() if name not in here}
+        self.bag.add_metadata(f"parameters {node}", recorded)
+        if node == "/plant":
+            self.bag.add_metadata("run", {"scenario": self._scenario, "seed": str(values.get("seed", ""))})
+            self.bag.add_attachment(LAYOUT, foxglove_layout(values.get("deputies", ())).encode())
 
-def _first_stamp(data: bytes) -> int:
-    """The stamp that a message begins with, in ns: after four bytes that tell how it is encoded."""
-    seconds, nanoseconds = struct.unpack_from("<iI", data, 4)
-    return int(seconds * NANOSECONDS + nanoseconds)
+
+def _parameter_files(arguments: list[str]) -> list[Path]:
+    """Parameter files that a node was started with."""
+    return [Path(file) for flag, file in pairwise(arguments) if flag == "--params-file"]
 
 
 def record(node: RecorderNode) -> None:
-    """Record until told to stop, and then until nothing more comes."""
+    """Record until told to stop, and then until nothing more comes; raises OSError when the disk fails."""
     try:
-        node.spin()
-        node.spin(node.is_quiet)
+        node.spin(lambda: asked_to_stop() or node.failure is not None)
+        node.spin(lambda: node.is_quiet() or node.failure is not None)
     finally:
         node.close()
+    if node.failure is not None:
+        raise node.failure
 
 
 def main() -> int:

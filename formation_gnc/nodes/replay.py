@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from importlib import import_module
 from time import monotonic
 from typing import Any
 
@@ -14,7 +13,7 @@ from formation_gnc.errors import ConfigurationError
 from formation_gnc.interface import NANOSECONDS
 from formation_gnc.mission import Mission, Orbit
 from formation_gnc.nodes import topics
-from formation_gnc.nodes.conversion import stamp
+from formation_gnc.nodes.conversion import message_class, stamp
 from formation_gnc.nodes.shell import ConfiguredNode, asked_to_stop, run
 from formation_gnc.parameters import parameter
 from formation_gnc.recording.reader import Bag
@@ -98,12 +97,10 @@ class ReplayNode(ConfiguredNode):
             raise ConfigurationError(
                 f"topic {topic}: not in the bag; it has {', '.join(sorted(self.bag.topics))}"
             )
-        name = self.bag.topics[topic].type_name
         try:
-            package, kind, message = name.split("/")
-            return getattr(import_module(f"{package}.{kind}"), message)
-        except (ImportError, AttributeError, ValueError):
-            raise ConfigurationError(f"topic {topic}: its type {name!r} is not installed") from None
+            return message_class(self.bag.topics[topic].type_name)
+        except ConfigurationError as error:
+            raise ConfigurationError(f"topic {topic}: {error}") from None
 
     def _read(self) -> Iterator[tuple[int, list[tuple[str, bytes]], set[str]]]:
         """Stamp, messages to play and recorded answers of every tick, for ever when looping."""

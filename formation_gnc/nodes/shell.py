@@ -224,8 +224,8 @@ def run(make_node: Callable[[], ConfiguredNode], fly: Callable[[Any], None] = Co
     or recorded.
 
     Returns:
-        0 after an ordinary end or an interruption, 1 when a satellite came down, 2 when something given to
-        the node is not allowed.
+        0 after an ordinary end or an interruption, 1 when a satellite came down or a disk took no more, 2
+        when something given to the node is not allowed.
     """
     node = None
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -238,8 +238,8 @@ def run(make_node: Callable[[], ConfiguredNode], fly: Callable[[Any], None] = Co
     except (ConfigurationError, *REFUSED_BY_ROS) as refusal:
         print(f"{Path(sys.argv[0]).name}: {' '.join(str(refusal).split())}", file=sys.stderr)
         return 2
-    except ImpactError as impact:
-        print(f"{Path(sys.argv[0]).name}: {impact}", file=sys.stderr)
+    except (ImpactError, OSError) as end:
+        print(f"{Path(sys.argv[0]).name}: {end}", file=sys.stderr)
         return 1
     finally:
         if node is not None:

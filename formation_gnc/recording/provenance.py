@@ -7,6 +7,9 @@ from pathlib import Path
 
 import formation_gnc
 
+LOST = "lost messages"
+"""Name of the metadata record that says how many messages of each topic a recorder knows to have missed."""
+
 PACKAGES = ("numpy", "scipy", "numba", "filterpy", "osqp", "mcap")
 
 

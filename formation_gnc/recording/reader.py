@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.recording.decode import MessageType
 from formation_gnc.recording.mcap_file import McapFile, mcap_files
+from formation_gnc.recording.provenance import LOST
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,7 +57,7 @@ class Bag:
     topics: by name. metadata: MCAP metadata records by name, the provenance of the run among them.
     attachments: files carried in the bag. start_ns, end_ns: first and last stamp (0 and 0 when empty).
     damage: None, or why the bag ends where it ends, when its recorder could not finish it; everything before
-    is read as usual. Stamps are simulated time in ns.
+    is read as usual. lost: messages that the recorder knows to have missed. Stamps are simulated time in ns.
     Raises ConfigurationError, here or while reading, when the path is missing, holds no MCAP file, or is
     damaged.
     """
@@ -68,6 +69,7 @@ class Bag:
         self.metadata = {name: data for file in self._files for name, data in file.metadata.items()}
         self.metadata.pop("rosbag2", None)  # rosbag2's own copy of metadata.yaml
         self.attachments = {name: data for file in self._files for name, data in file.attachments.items()}
+        self.lost = sum(int(count) for count in self.metadata.get(LOST, {}).values())
         self.damage = next((file.damage for file in self._files if file.damage), None)
         spans = [span for file in self._files for span in file.spans]
         self.start_ns = min((span.start for span in spans), default=0)

@@ -163,6 +163,20 @@ class BagWriter:
             self._file.mcap.add_metadata(name, self._metadata[name])
         self._unwritten = True
 
+    def add_attachment(self, name: str, data: bytes) -> None:
+        """Add a file to be carried in the bag."""
+        self._attachments[name] = data
+        with self._guarded():
+            self._attach(name)
+        self._unwritten = True
+
+    def begin_file(self) -> None:
+        """Let the bag go on in a next file, unless the last one has no message yet."""
+        if self._file.count:
+            with self._guarded():
+                self._finish_file()
+                self._start_file()
+
     def write(self, topic: str, data: bytes, stamp_ns: int, sequence: int) -> None:
         """Append one serialised message.
 
@@ -177,9 +191,7 @@ class BagWriter:
         if stamp_ns < 0:
             raise ConfigurationError(f"topic {topic!r}: stamp {stamp_ns} ns: must not be negative")
         if self._split is not None and self._is_full(self._split, stamp_ns):
-            with self._guarded():
-                self._finish_file()
-                self._start_file()
+            self.begin_file()
         file = self._file
         try:
             file.mcap.add_message(entry.channel, stamp_ns, data, stamp_ns, sequence & 0xFFFFFFFF)
@@ -229,15 +241,21 @@ class BagWriter:
         mcap.start(profile="ros2", library=f"formation_gnc {__version__}, {LIBRARY_IDENTIFIER}")
         for name, values in self._metadata.items():
             mcap.add_metadata(name, values)
-        for name, data in self._attachments.items():
-            media_type = _MEDIA_TYPES.get(Path(name).suffix, "application/octet-stream")
-            mcap.add_attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)
-        self._file = _File(path, stream, mcap, overhead=stream.tell())
+        self._file = _File(path, stream, mcap, overhead=0)
+        for name in self._attachments:
+            self._attach(name)
+        self._file.overhead = stream.tell()
         self._files.append(self._file)
         for topic, entry in self._topics.items():
             entry.channel = self._register(topic, entry.definition)
         self._unwritten = self._unlisted = True
         self._flush()
+
+    def _attach(self, name: str) -> None:
+        media_type = _MEDIA_TYPES.get(Path(name).suffix, "application/octet-stream")
+        self._file.mcap.add_attachment(
+            create_time=0, log_time=0, name=name, media_type=media_type, data=self._attachments[name]
+        )
 
     def _register(self, topic: str, definition: TopicDefinition) -> int:
         file = self._file
@@ -253,8 +271,6 @@ class BagWriter:
 
     def _is_full(self, split: Split, stamp_ns: int) -> bool:
         file = self._file
-        if file.count == 0:
-            return False
         if split.max_duration is not None and stamp_ns - file.start >= split.max_duration * 1e9:
             return True
         return split.max_bytes is not None and file.stream.tell() - file.overhead >= split.max_bytes

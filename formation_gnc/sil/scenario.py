@@ -48,17 +48,17 @@ class Scenario:
             nodes |= {f"/{name}/{part}": value for part, value in vars(setup).items()}
         return {node: dump(values) for node, values in nodes.items()}
 
-    def write(self, path: Path, extra: Mapping[str, Mapping[str, Any]]) -> None:
-        """Write the scenario as a ROS 2 parameter file, nothing left to defaults and `extra` on top of it."""
+    def text(self, extra: Mapping[str, Mapping[str, Any]] | None = None) -> str:
+        """The scenario as a ROS 2 parameter file, nothing left to defaults and `extra` on top of it."""
         nodes = self.parameters()
-        for node, values in extra.items():
+        for node, values in (extra or {}).items():
             nodes[node] = nodes.get(node, {}) | dict(values)
         document = {
             # rclpy takes an empty list for a parameter without a type: left out, it is the default
             node: {SECTION: {name: _plain(value) for name, value in values.items() if value != ()}}
             for node, values in nodes.items()
         }
-        path.write_text(yaml.safe_dump(document, sort_keys=False))
+        return str(yaml.safe_dump(document, sort_keys=False))
 
 
 def _plain(value: Any) -> Any:

@@ -1,0 +1,94 @@
+"""The panels in which Foxglove shows a run, as a layout file that it imports."""
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+LAYOUT = "foxglove_layout.json"
+"""File name of the layout among a bag's attachments."""
+
+AXES = ("x radial", "y along-track", "z cross-track")
+PARTS = ("navigation", "guidance", "controller")
+
+
+def foxglove_layout(deputies: Sequence[str]) -> str:
+    """A layout for a run of these deputies, JSON: a tab for each, and the events of the run beside them."""
+    panels: dict[str, Any] = {}
+
+    def panel(kind: str, name: str, **settings: Any) -> str:
+        panels[f"{kind}!{name}"] = settings
+        return f"{kind}!{name}"
+
+    def plot(name: str, title: str, series: dict[str, str], **settings: Any) -> str:
+        paths = [
+            {"value": path, "label": label, "enabled": True, "timestampMethod": "headerStamp"}
+            for label, path in series.items()
+        ]
+        shown = {"showLegend": True, "legendDisplay": "floating", "isSynced": True, "xAxisVal": "timestamp"}
+        return panel("Plot", name, foxglovePanelTitle=title, paths=paths, **(shown | settings))
+
+    def by_axis(topic: str, first: int = 0) -> dict[str, str]:
+        return {axis: f"{topic}[{first + index}]" for index, axis in enumerate(AXES)}
+
+    def tab(index: int, name: str) -> dict[str, Any]:
+        truth = f"/truth.deputies[{index}].relative_state"
+        path = plot(
+            f"{name}-path",
+            "Path in the Hill frame: radial over along-track [m]",
+            {"path": f"{truth}[0]"},
+            xAxisVal="custom",
+            xAxisPath={"value": f"{truth}[1]", "enabled": True},
+        )
+        state = plot(f"{name}-truth", "True relative position [m]", by_axis(truth))
+        estimate = plot(
+            f"{name}-estimate", "Estimated position [m]", by_axis(f"/{name}/estimate.relative_state")
+        )
+        target = plot(f"{name}-target", "Target position [m]", by_axis(f"/{name}/target.relative_state"))
+        thrust = plot(f"{name}-thrust", "Thrust [N]", by_axis(f"/{name}/thrust.force"))
+        timing = plot(
+            f"{name}-timing",
+            "Compute time [s]",
+            {part: f'/{name}/timing{{node=="{part}"}}.compute_time' for part in PARTS},
+        )
+        states = panel(
+            "StateTransitions",
+            f"{name}-states",
+            foxglovePanelTitle="Law, filter and shadow",
+            isSynced=True,
+            paths=[
+                {"value": f"/{name}/{field}", "label": field, "timestampMethod": "headerStamp"}
+                for field in ("status.algorithm", "status.fallback", "estimate.status", "measurement.eclipse")
+            ],
+        )
+        left = _stacked("column", [path, states])
+        return {
+            "title": name,
+            "layout": _stacked("row", [left, _stacked("column", [state, estimate, target, thrust, timing])]),
+        }
+
+    tabs = panel("Tab", "deputies", activeTabIdx=0, tabs=[tab(*each) for each in enumerate(deputies)])
+    events = panel("RawMessages", "events", foxglovePanelTitle="Events", topicPath="/events")
+    state_of_run = panel("DiagnosticSummary", "run", foxglovePanelTitle="Run", topicToRender="/diagnostics")
+    said = panel("RosOut", "rosout", foxglovePanelTitle="What the nodes said")
+    side = _stacked("column", [state_of_run, events, said])
+    layout = {
+        "configById": panels,
+        "globalVariables": {},
+        "userNodes": {},
+        "playbackConfig": {"speed": 1.0},
+        "layout": {"direction": "row", "first": tabs, "second": side, "splitPercentage": 76},
+    }
+    return json.dumps(layout, indent=1) + "\n"
+
+
+def _stacked(direction: str, items: list[Any]) -> Any:
+    """Items of the same size one after the other: a binary tree, as Foxglove splits space."""
+    if len(items) == 1:
+        return items[0]
+    rest = _stacked(direction, items[1:])
+    return {
+        "direction": direction,
+        "first": items[0],
+        "second": rest,
+        "splitPercentage": round(100.0 / len(items), 3),
+    }

@@ -1,0 +1,34 @@
+"""The last minutes of a run in memory, written when asked for."""
+
+from collections import deque
+
+from formation_gnc.recording.writer import BagWriter
+
+
+class Snapshot:
+    """Keeps the messages of the last stretch of simulated time, and writes them to a bag on a trigger.
+
+    Every trigger fills a file of its own in the bag with what came since the last one, as far as it is kept.
+    """
+
+    def __init__(self, bag: BagWriter, duration: float) -> None:
+        """Keep `duration` s of simulated time for `bag`, which is closed by the one who made it."""
+        self._bag, self._duration_ns = bag, round(duration * 1e9)
+        self._kept: deque[tuple[str, bytes, int, int]] = deque()
+        self._latest = 0
+
+    def write(self, topic: str, data: bytes, stamp_ns: int, sequence: int) -> None:
+        """Keep one message; takes what `BagWriter.write` takes."""
+        self._kept.append((topic, data, stamp_ns, sequence))
+        self._latest = max(self._latest, stamp_ns)
+        while self._kept[0][2] <= self._latest - self._duration_ns:
+            self._kept.popleft()
+
+    def trigger(self) -> int:
+        """Write what is kept, and keep nothing any more; returns the number of messages written."""
+        count = len(self._kept)
+        self._bag.begin_file()
+        while self._kept:
+            self._bag.write(*self._kept.popleft())
+        self._bag.flush()
+        return count

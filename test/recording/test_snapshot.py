@@ -1,0 +1,33 @@
+from formation_gnc.recording import Bag
+from formation_gnc.recording.snapshot import Snapshot
+from formation_gnc.recording.writer import BagWriter
+
+
+def test_a_trigger_writes_the_last_stretch_and_each_a_file_of_its_own(tmp_path, flight) -> None:
+    writer = BagWriter(tmp_path / "run", {})
+    for topic, type_name in dict.fromkeys((message.topic, message.type_name) for message in flight):
+        writer.add_topic(topic, type_name, depth=10)
+    snapshot = Snapshot(writer, 20.0)
+    written = []
+    for number, message in enumerate(flight):
+        snapshot.write(message.topic, message.data, message.stamp_ns, number)
+        if message.topic == "/clock" and message.stamp_ns in (50_500_000_000, 60_500_000_000):
+            written.append(snapshot.trigger())
+    writer.close()
+    spans = [(30.5, 50.5), (50.5, 60.5)]  # the second begins where the first ended: nothing twice
+    for file, (first, last), count in zip(("run_0", "run_1"), spans, written, strict=True):
+        bag = Bag(tmp_path / "run" / f"{file}.mcap")
+        assert (bag.start_ns, bag.end_ns) == ((first + (file == "run_0")) * 1e9, last * 1e9)
+        assert sum(topic.count for topic in bag.topics.values()) == count
+    kept = [(topic, data) for topic, data, _ in Bag(tmp_path / "run").messages()]
+    flown = [(m.topic, m.data) for m in flight]
+    first = flown.index(kept[0])
+    assert kept == flown[first : first + len(kept)], "one stretch without a gap"
+
+
+def test_what_no_trigger_asked_for_is_not_written(tmp_path, flight) -> None:
+    with BagWriter(tmp_path / "run", {}) as writer:
+        writer.add_topic("/clock", "rosgraph_msgs/msg/Clock", depth=10)
+        snapshot = Snapshot(writer, 20.0)
+        snapshot.write("/clock", flight[0].data, 1, 1)
+    assert Bag(tmp_path / "run").topics["/clock"].count == 0
