@@ -12,7 +12,9 @@ from pathlib import Path
 import domain_coordinator
 import pytest
 
+from formation_gnc.errors import ConfigurationError
 from formation_gnc.nodes.launcher import executable
+from formation_gnc.recording import Bag
 from formation_gnc.sil.scenario import find_scenario
 
 GNC_TOPICS = (
@@ -124,15 +126,16 @@ class Sil:
                     found[Path(word).name] = int(pid)
         return found
 
-    def recorded_bytes(self) -> int:
-        return sum(path.stat().st_size for path in self.bag.glob("*.mcap"))
+    def is_recorded(self) -> bool:
+        """Whether messages of the flight are on disk."""
+        try:
+            return Bag(self.bag).topics["/truth"].count > 0
+        except (ConfigurationError, KeyError):  # not made yet, or not yet heard of
+            return False
 
     def wait_for_flight(self) -> None:
-        """Until messages of the flight are on disk: far more than the topics' definitions alone."""
-        wait_until(
-            lambda: self.recorded_bytes() > 100_000 or self.process.poll() is not None,
-            "the flight to be recorded",
-        )
+        """Until the flight is being recorded."""
+        wait_until(lambda: self.is_recorded() or self.process.poll() is not None, "the flight to be recorded")
         assert self.process.poll() is None, self.process.stderr.read() if self.process.stderr else ""
 
     def finish(self, patience: float = PATIENCE) -> tuple[int, str, str]:
