@@ -1,5 +1,6 @@
 """All control laws by name: a new law is one file and one line here."""
 
+from formation_gnc.control.asre import Asre
 from formation_gnc.control.coast import Coast
 from formation_gnc.control.controller import Controller
 from formation_gnc.control.gmpsp import GmpspController
@@ -7,6 +8,8 @@ from formation_gnc.control.hinf import HInfinityController
 from formation_gnc.control.lqr import LinearQuadraticRegulator
 from formation_gnc.control.mpc import ModelPredictiveController
 from formation_gnc.control.mpsp import MpspController
+from formation_gnc.control.sdre import Sdre
+from formation_gnc.control.sdre_finite import FiniteSdre
 
 ALGORITHMS: dict[str, type[Controller]] = {
     "coast": Coast,
@@ -15,4 +18,7 @@ ALGORITHMS: dict[str, type[Controller]] = {
     "mpc": ModelPredictiveController,
     "mpsp": MpspController,
     "gmpsp": GmpspController,
+    "sdre": Sdre,
+    "sdre_finite": FiniteSdre,
+    "asre": Asre,
 }

@@ -1,0 +1,223 @@
+"""The laws of the state-dependent Riccati equation: infinite and finite time, and its sequence."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from formation_gnc.control.asre import Asre, AsreParameters
+from formation_gnc.control.autopilot import Autopilot, ControllerParameters
+from formation_gnc.control.controller import Handover, Vehicle
+from formation_gnc.control.finite_horizon import Task
+from formation_gnc.control.lqr import LinearQuadraticRegulator, LqrParameters
+from formation_gnc.control.sdre import Sdre, SdreParameters
+from formation_gnc.control.sdre_finite import FiniteSdre, SdreFiniteParameters
+from formation_gnc.errors import DesignError
+from formation_gnc.guidance.relative_orbit import RelativeOrbit, RelativeOrbitParameters
+from formation_gnc.mission import Mission, Orbit
+from formation_gnc.orbit.elements import Elements, state_from_elements
+from formation_gnc.orbit.frames import hill_rotation, inertial_from_relative, relative_from_inertial
+from formation_gnc.orbit.propagation import advance_with_transition
+from formation_gnc.parameters import load
+from formation_gnc.relative.chief import KeplerChief
+from formation_gnc.relative.nonlinear import NonlinearModel
+
+WEIGHTS = {"position_error": (10.0,) * 3, "velocity_error": (0.1,) * 3, "thrust": (0.002,) * 3}
+CHIEF = Elements(1e7, 0.15, 1.0, 0.3, 0.2, 0.17)
+STRONG = Vehicle(100.0, np.full(3, 50.0))
+
+
+def fly(law, estimate, target, start, goal, ticks, tick=10.0, chief=CHIEF, disturbance=0.0):
+    """States (N + 1, 6) and commands on the truth of two orbits under J2."""
+    leader = state_from_elements(chief)
+    follower = inertial_from_relative(leader, start)
+    states, commands = [start], []
+    for index in range(ticks):
+        time = index * tick
+        aim = goal(time) if callable(goal) else goal
+        commands.append(law.command(estimate(states[-1], time, chief=leader), target(aim, time)))
+        thrust = (commands[-1].force + disturbance) @ hill_rotation(leader) / 100.0
+        leader = advance_with_transition(leader, np.zeros(3), tick, 1)[0]
+        follower = advance_with_transition(follower, thrust, tick, 1)[0]
+        states.append(relative_from_inertial(leader, follower))
+    return np.array(states), commands
+
+
+def test_near_a_circular_chief_of_a_point_mass_it_is_lqr(mission, vehicle, estimate, target):
+    chief = state_from_elements(Elements(**vars(mission.chief)))
+    sdre = Sdre(SdreParameters(model="nonlinear", **WEIGHTS), mission, vehicle)
+    lqr = LinearQuadraticRegulator(LqrParameters(**WEIGHTS), mission, vehicle)
+    state = np.array([0.5, -0.8, 0.3, 1e-3, 2e-3, -1e-3])
+    ours = sdre.command(estimate(state, chief=chief), target()).force
+    np.testing.assert_allclose(ours, lqr.command(estimate(state), target()).force, rtol=1e-6)
+
+
+@pytest.mark.parametrize("factorisation", ["sdc1", "sdc2"])
+def test_a_gain_stabilises_the_matrix_it_is_made_for(factorisation):
+    law = Sdre(SdreParameters(factorisation=factorisation, **WEIGHTS), Mission(Orbit(1e7)), STRONG)
+    model = NonlinearModel(KeplerChief.of(CHIEF))
+    for time in np.linspace(0.0, model.period, 7):
+        dynamics = model.dynamics(float(time), np.array([2e4, -4e4, 3e4, 0, 0, 0]))
+        gain = law.gain(dynamics)
+        closed = dynamics - np.vstack([np.zeros((3, 6)), gain])
+        assert np.linalg.eigvals(closed).real.max() < 0.0
+
+
+def test_sdre_takes_a_deputy_to_a_free_orbit_far_away_and_stays(estimate, target):
+    """50 km about an eccentric chief: the target moves as the truth does, and nothing is left to cancel."""
+    goal_start = np.array([1.5e4, 4e4, 2e4, 5.0, -20.0, 3.0])
+    leader = state_from_elements(CHIEF)
+    deputy = inertial_from_relative(leader, goal_start)
+    goals = []
+    for _ in range(401):
+        goals.append(relative_from_inertial(leader, deputy))
+        leader, deputy = (advance_with_transition(each, np.zeros(3), 10.0, 1)[0] for each in (leader, deputy))
+    weights = {"position_error": (100.0,) * 3, "velocity_error": (1.0,) * 3, "thrust": (2.0,) * 3}
+    law = Sdre(SdreParameters(**weights), Mission(Orbit(1e7, 0.15), tick=10.0), STRONG)
+    states, commands = fly(
+        law,
+        estimate,
+        target,
+        goal_start + np.array([3e3, -2e3, 1e3, 0, 0, 0]),
+        lambda time: goals[round(time / 10.0)],
+        400,
+    )
+    assert not any(command.fallback for command in commands)
+    assert np.linalg.norm((states[-1] - goals[-1])[:3]) < 0.1  # of 3.7 km
+
+
+def test_the_integral_removes_a_constant_force(estimate, target):
+    mission = Mission(Orbit(1e7, 0.0), tick=10.0)
+    chief = dataclasses.replace(CHIEF, eccentricity=0.0)
+    left = {}
+    for integral in (0.0, 2e4):
+        law = Sdre(SdreParameters(integral_error=integral, **WEIGHTS), mission, STRONG)
+        states, _ = fly(law, estimate, target, np.zeros(6), np.zeros(6), 1500, chief=chief, disturbance=1e-3)
+        left[integral] = np.linalg.norm(states[-1, :3])
+    assert left[0.0] > 1.0
+    assert left[2e4] < 0.05 * left[0.0]
+
+
+def test_a_change_of_parameters_keeps_the_integral(mission, vehicle, estimate, target):
+    law, other = (Sdre(SdreParameters(integral_error=100.0, **WEIGHTS), mission, vehicle) for _ in range(2))
+    chief = state_from_elements(Elements(**vars(mission.chief)))
+    for tick in range(5):
+        law.command(estimate([0.1, 0.1, 0.1, 0, 0, 0], 10.0 * tick, chief=chief), target(time=10.0 * tick))
+    other.take_over(Handover(np.zeros(3), "sdre", law))
+    seen, aim = estimate(np.zeros(6), 50.0, chief=chief), target(time=50.0)
+    assert other.command(seen, aim).force.any()
+    np.testing.assert_array_equal(other.command(seen, aim).force, law.command(seen, aim).force)
+
+
+def test_a_gain_that_does_not_exist_is_named_and_lqr_flies(mission, vehicle, estimate, target):
+    law = Sdre(SdreParameters(**WEIGHTS), mission, vehicle)
+    state = np.array([5.0, -8.0, 3.0, 0.0, 0.0, 0.0])
+    for chief, words in ((np.zeros(6), "no gain"), (np.full(6, np.nan), "no gain")):
+        command = law.command(estimate(state, chief=chief), target())
+        assert words in command.fallback
+        np.testing.assert_array_equal(command.force, law.reserve.command(estimate(state), target()).force)
+    # so far away that the matrices overflow
+    chief = state_from_elements(Elements(**vars(mission.chief)))
+    with np.errstate(all="ignore"):
+        assert (
+            "LQR flies" in law.command(estimate(1e160 * state, 10.0, chief=chief), target(time=10.0)).fallback
+        )
+
+
+def test_weights_that_are_none_are_refused(mission, vehicle):
+    with pytest.raises(DesignError, match="sdre: state_weight has 2 values"):
+        Sdre(SdreParameters(state_weight=(1.0, 2.0)), mission, vehicle)
+
+
+@pytest.mark.parametrize(("law", "parameters"), [(FiniteSdre, SdreFiniteParameters), (Asre, AsreParameters)])
+def test_a_reconfiguration_arrives_in_time_and_is_held(law, parameters, estimate, target):
+    """5 km about an eccentric chief under J2, from within a kilometre to within metres."""
+    mission = Mission(Orbit(1e7, 0.15), tick=10.0)
+    start = np.array([353.0, 707.0, 353.0, 0.22, -0.44, 0.22])
+    leader = state_from_elements(CHIEF)
+    deputy = inertial_from_relative(leader, np.array([3800.0, 5900.0, 4200.0, 1.0, -4.0, 1.5]))
+    goals = []
+    for _ in range(251):
+        goals.append(relative_from_inertial(leader, deputy))
+        leader, deputy = (advance_with_transition(each, np.zeros(3), 10.0, 1)[0] for each in (leader, deputy))
+    flying = law(
+        parameters(final_time=2000.0, last_plan=60.0, replan_interval=60.0, **WEIGHTS), mission, STRONG
+    )
+    states, commands = fly(flying, estimate, target, start, lambda time: goals[round(time / 10.0)], 250)
+    assert not any(command.fallback for command in commands)
+    assert [command.solver for command in commands[199:202]] == ["following", "holding", "holding"]
+    off = np.linalg.norm((states - goals)[:, :3], axis=1)
+    assert off[0] > 5000.0
+    # SDRE's last plan, 80 s before the end, still has its matrices frozen: (n t)^3 of what changes
+    assert off[200] < (0.1 if law is Asre else 2.0)
+    assert off[-1] < 2.0
+
+
+def test_a_plan_is_a_pure_function_of_its_task(mission):
+    model = NonlinearModel(KeplerChief.of(CHIEF))
+    task = Task(model, 0.0, np.array([300.0, 700, 300, 0.2, -0.4, 0.2]), np.zeros(6), 1000.0, 20)
+    for law in (
+        FiniteSdre(SdreFiniteParameters(), mission, STRONG),
+        Asre(AsreParameters(), mission, STRONG),
+    ):
+        first, second = law.plan(task), law.plan(task)
+        np.testing.assert_array_equal(first.acceleration, second.acceleration)
+
+
+def test_a_sequence_that_does_not_converge_is_named(mission, vehicle, estimate, target):
+    law = Asre(AsreParameters(most_iterations=1, **WEIGHTS), mission, vehicle)
+    chief = state_from_elements(Elements(**vars(mission.chief)))
+    command = law.command(estimate([20.0, 0, 0, 0, 0, 0], chief=chief), target())
+    assert command.fallback.startswith("no plan: not converged in 1 iterations")
+
+
+def test_one_step_is_no_plan_and_says_so(mission, vehicle, estimate, target):
+    law = FiniteSdre(SdreFiniteParameters(final_time=20.0, **WEIGHTS), mission, vehicle)
+    chief = state_from_elements(Elements(**vars(mission.chief)))
+    command = law.command(estimate([20.0, 0, 0, 0, 0, 0], chief=chief), target())
+    assert "singular" in command.fallback
+
+
+anything = st.floats(allow_nan=True, allow_infinity=True)
+
+
+@pytest.mark.parametrize("law", ["sdre", "sdre_finite", "asre"])
+@settings(deadline=None, max_examples=30)
+@given(
+    state=hnp.arrays(float, 6, elements=anything),
+    goal=hnp.arrays(float, 6, elements=anything),
+    chief=hnp.arrays(float, 6, elements=anything),
+    size=st.sampled_from([None, 1.0, 1e3, 1e6, 1e150]),
+    final_time=st.floats(1.0, 5000.0),
+)
+def test_whatever_comes_in_the_force_is_finite_and_within_the_limit(
+    law, state, goal, chief, size, final_time, estimate, target
+):
+    """Any numbers at all, or, with a size, states of that size about a chief in orbit."""
+    values = {"chief.semi_major_axis": 6978100.0, "tick": 10.0, "algorithm": law}
+    if law != "sdre":
+        values |= {f"{law}.final_time": final_time, f"{law}.step": 100.0}
+    pilot = Autopilot("controller", load(ControllerParameters, values))
+    if size is not None:
+        state, goal = (size * np.tanh(np.nan_to_num(each)) for each in (state, goal))
+        chief = state_from_elements(Elements(6978100.0, 0.0, 1.48, 0.0, 0.0, 0.0))
+    for tick in range(2):
+        thrust, status = pilot.on_tick(estimate(state, 10.0 * tick, chief=chief), target(goal, 10.0 * tick))
+        assert np.isfinite(thrust.force).all()
+        assert (np.abs(thrust.force) <= 0.01).all()
+        assert np.isfinite(status.demand).all()
+        assert np.isfinite(status.cost)
+
+
+def test_a_free_orbit_is_followed_with_next_to_no_thrust(estimate, target):
+    """About a circular chief of a point mass Hill's ellipse is nearly free: no more is asked."""
+    mission = Mission(Orbit(6978100.0), tick=10.0)
+    orbit = RelativeOrbit(RelativeOrbitParameters(rho=100.0, m=1.0), mission.mean_motion)
+    law = Sdre(SdreParameters(model="nonlinear", **WEIGHTS), mission, Vehicle(100.0, np.full(3, 0.01)))
+    chief = state_from_elements(Elements(6978100.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    state = orbit.states(np.zeros(1))[0]
+    force = law.command(estimate(state, chief=chief), target(state)).force
+    assert not force.any()
