@@ -57,7 +57,8 @@ class Task:
     guess: Matrix | None = None
     """(steps, 3) what is left of the plan before, m/s^2; none for the first."""
     effort: Matrix = field(default_factory=lambda: np.eye(3))
-    """(3, 3) weight R: the plan minimises the integral of a' R a over the acceleration ..."""
+    """(3, 3) weight R: the plan minimises the integral of a' R a over the acceleration, infinite on an axis
+    that does not push ..."""
     slack: Matrix = field(default_factory=lambda: np.zeros((6, 6)))
     """(6, 6) ... plus e' S^-1 e of the error at the final time; zero allows none."""
 
@@ -193,6 +194,7 @@ class FiniteHorizonController(Controller):
         holding = LqrParameters(feed_forward=parameters.feed_forward, **parameters.weights())
         self.holding = LinearQuadraticRegulator(holding, mission, vehicle)
         self._effort = vehicle.mass**2 * parameters.thrust_matrix() / parameters.final_time
+        self._effort[np.diag_indices(3)] += np.where(vehicle.thrust_limit > 0.0, 0.0, np.inf)
         self._slack = np.zeros((6, 6))
         if parameters.terminal_error > 0.0:
             self._slack = parameters.terminal_error**2 * np.linalg.pinv(parameters.state_matrix())

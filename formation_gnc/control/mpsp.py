@@ -36,7 +36,6 @@ class StaticProgrammingController(FiniteHorizonController):
         super().__init__(parameters, mission, vehicle)
         self._hill = HillModel(mission.mean_motion)
         self._cost = parameters.state_matrix(), vehicle.mass**2 * parameters.thrust_matrix()
-        self._effort[np.diag_indices(3)] += np.where(vehicle.thrust_limit > 0.0, 0.0, np.inf)
         self._tolerance = TOLERANCE * np.array(parameters.position_error + parameters.velocity_error)
 
     def plan(self, task: Task) -> Plan:

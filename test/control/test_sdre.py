@@ -174,6 +174,23 @@ def test_a_sequence_that_does_not_converge_is_named(mission, vehicle, estimate, 
     assert command.fallback.startswith("no plan: not converged in 1 iterations")
 
 
+@pytest.mark.parametrize("law", [FiniteSdre, Asre])
+def test_an_axis_without_thrust_gets_none(law, mission, estimate, target):
+    """Without the radial one all can be reached; not so without one that changes the energy, or the third."""
+    chief = state_from_elements(Elements(**vars(mission.chief)))
+    for idle, words in ((0, ""), (1, "no plan"), (2, "no plan")):
+        limit = np.full(3, 0.05)
+        limit[idle] = 0.0
+        flying = law(law.Parameters(**WEIGHTS), mission, Vehicle(100.0, limit))
+        command = flying.command(estimate([2.0, 5.0, 5.0, 0, 0, 0], chief=chief), target())
+        if words:
+            assert words in command.fallback
+        else:
+            assert not command.fallback
+            assert command.force[idle] == 0.0
+            assert command.force.any()
+
+
 def test_one_step_is_no_plan_and_says_so(mission, vehicle, estimate, target):
     law = FiniteSdre(SdreFiniteParameters(final_time=20.0, **WEIGHTS), mission, vehicle)
     chief = state_from_elements(Elements(**vars(mission.chief)))
