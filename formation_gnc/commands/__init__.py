@@ -1,6 +1,6 @@
 """Subcommands of `formation-gnc`, one module each: a docstring for its help, `add_arguments` and `run`."""
 
-from formation_gnc.commands import compare, design, navigate, recover, replay, report, sil
+from formation_gnc.commands import compare, design, navigate, recover, replay, report, sil, view
 
 COMMANDS = {
     "sil": sil,
@@ -9,5 +9,6 @@ COMMANDS = {
     "replay": replay,
     "compare": compare,
     "report": report,
+    "view": view,
     "recover": recover,
 }

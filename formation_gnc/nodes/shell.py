@@ -24,9 +24,9 @@ from rclpy.task import Future
 from std_msgs.msg import Header
 
 try:
-    from rclpy.experimental import EventsExecutor as Executor
+    from rclpy.experimental import EventsExecutor
 except ImportError:  # other builds of Jazzy do not have it; theirs is slower and does the same
-    Executor = SingleThreadedExecutor
+    EventsExecutor = SingleThreadedExecutor
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.interface import Event
@@ -35,6 +35,8 @@ from formation_gnc.nodes.conversion import from_message, message_type, to_messag
 from formation_gnc.orbit.propagation import ImpactError
 from formation_gnc.parameters import OWN_OF_ROS, Leaf, dump, leaves, load, read_yaml
 from formation_gnc.part import Part
+
+Executor: Any = EventsExecutor
 
 REFUSED_BY_ROS = (RCLInvalidROSArgsError, UnknownROSArgsError, RCLError, RMWError)
 """What rclpy raises for arguments, parameter files and middleware it cannot use."""

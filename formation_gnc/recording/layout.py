@@ -30,8 +30,8 @@ def foxglove_layout(deputies: Sequence[str]) -> str:
     def by_axis(topic: str, first: int = 0) -> dict[str, str]:
         return {axis: f"{topic}[{first + index}]" for index, axis in enumerate(AXES)}
 
-    def tab(index: int, name: str) -> dict[str, Any]:
-        truth = f"/truth.deputies[{index}].relative_state"
+    def tab(name: str) -> dict[str, Any]:
+        truth = f'/truth.deputies[:]{{name=="{name}"}}.relative_state'
         path = plot(
             f"{name}-path",
             "Path in the Hill frame: radial over along-track [m]",
@@ -66,7 +66,7 @@ def foxglove_layout(deputies: Sequence[str]) -> str:
             "layout": _stacked("row", [left, _stacked("column", [state, estimate, target, thrust, timing])]),
         }
 
-    tabs = panel("Tab", "deputies", activeTabIdx=0, tabs=[tab(*each) for each in enumerate(deputies)])
+    tabs = panel("Tab", "deputies", activeTabIdx=0, tabs=[tab(name) for name in deputies])
     events = panel("RawMessages", "events", foxglovePanelTitle="Events", topicPath="/events")
     state_of_run = panel("DiagnosticSummary", "run", foxglovePanelTitle="Run", topicToRender="/diagnostics")
     said = panel("RosOut", "rosout", foxglovePanelTitle="What the nodes said")

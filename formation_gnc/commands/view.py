@@ -1,0 +1,53 @@
+"""Show a running graph live in Foxglove, or play a bag to it.
+
+Serves the Foxglove WebSocket protocol on this machine: open the page that is printed in a browser, or connect
+the app to the address, and import the layout. The graph is that of ROS_DOMAIN_ID, which `formation-gnc sil`
+prints. A bag's viewers may pause, seek and change the speed.
+"""
+
+import argparse
+import signal
+from pathlib import Path
+
+from formation_gnc.errors import ConfigurationError
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the command."""
+    parser.add_argument("--bag", metavar="DIR", type=Path, help="bag to play instead of a running graph")
+    parser.add_argument(
+        "--rate",
+        metavar="X",
+        type=float,
+        default=100.0,
+        help="simulated seconds of the bag per wall second, to begin with (default: 100)",
+    )
+    parser.add_argument("--port", metavar="N", type=int, default=8765, help="port; 0 for a free one (8765)")
+    parser.add_argument(
+        "--layout", metavar="FILE", type=Path, help="write the layout there that shows the deputies there are"
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Serve until interrupted."""
+    try:
+        from formation_gnc.recording.live import LiveView, Player
+    except ImportError:
+        raise ConfigurationError("foxglove-sdk is not installed: pip install foxglove-sdk") from None
+    from formation_gnc.nodes.viewer import show_graph
+    from formation_gnc.recording.reader import Bag
+
+    player = Player(Bag(options.bag), options.port, options.layout, options.rate) if options.bag else None
+    view = player.view if player else LiveView("formation_gnc", options.port, options.layout)
+    stopped: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda number, _: stopped.append(number))
+    print(f"serving {view.address}\nopen: {view.page}", flush=True)
+    try:
+        if player:
+            player.play(lambda: bool(stopped))
+        else:
+            show_graph(view, lambda: bool(stopped))
+    finally:
+        view.close()
+    return 0
