@@ -1,0 +1,36 @@
+"""Every scenario in params/, shortened: it flies, and its log is flown again to the same bits."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from formation_gnc.cli import main
+from formation_gnc.recording.reader import Bag
+from formation_gnc.sil.scenario import find_scenario, load_scenario
+
+SCENARIOS = sorted(path.stem for path in find_scenario("leader_follower").parent.glob("*.yaml"))
+TICKS = 200
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_every_scenario_is_replayed_to_the_recorded_bits(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("signal.signal", lambda *_: None)  # the command means to own its process
+    duration = TICKS * load_scenario(name).plant.tick
+    bag = tmp_path / "bag"
+    flown = main(["sil", name, "--in-process", "--json", "--duration", str(duration), "--bag", str(bag)])
+    assert flown == 0
+    assert json.loads(capsys.readouterr().out)["ticks"] == TICKS
+    assert main(["replay", str(bag), "--bag", str(tmp_path / "again")]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "identical on every GNC topic"
+    counts = [
+        {name: topic.count for name, topic in Bag(path).topics.items()} for path in (bag, tmp_path / "again")
+    ]
+    assert counts[0] == counts[1]
+    assert min(counts[0][topic] for topic in counts[0] if topic != "/events") == TICKS
+
+
+def test_there_are_scenarios() -> None:
+    assert len(SCENARIOS) > 3
