@@ -1,6 +1,7 @@
 """What every node of a run is told alike."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import sqrt
 
 from formation_gnc.errors import ConfigurationError
@@ -45,12 +46,12 @@ class Mission:
                 f"parameter tick: {self.tick!r} is not allowed; it must be a whole number of nanoseconds"
             )
 
-    @property
+    @cached_property
     def tick_ns(self) -> int:
         """The tick in nanoseconds."""
         return round(self.tick * NANOSECONDS)
 
-    @property
+    @cached_property
     def mean_motion(self) -> float:
         """Mean motion of the chief's two-body orbit, rad/s."""
         return sqrt(MU / self.chief.semi_major_axis**3)

@@ -1,6 +1,8 @@
 """The control law in use, its limits, and the swap from one law to another."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, make_dataclass
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -8,7 +10,7 @@ import numpy as np
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
 from formation_gnc.control.registry import ALGORITHMS
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.interface import Estimate, Status, Target, Thrust, Vector
+from formation_gnc.interface import Estimate, Status, Target, Thrust
 from formation_gnc.parameters import parameter
 from formation_gnc.part import Configuration, Part, Schedulable
 
@@ -58,16 +60,11 @@ class Autopilot(Part[Any, Controller]):
     before, beyond one step, is taken off and given back step by step.
     """
 
-    def __init__(self, name: str, parameters: Any) -> None:
-        """Design the law that `parameters.algorithm` names; raises ConfigurationError when it cannot be."""
-        super().__init__(name, parameters)
-        self._limit = np.array(parameters.thrust_limit)
-
     def forget(self) -> None:
         """Nothing has been flown yet."""
         self._force = np.zeros(3)
         self._predecessor: str | None = None
-        self._withheld = np.zeros(3)
+        self._withheld = [0.0, 0.0, 0.0]
         self._fallback = ""
 
     def design(self, parameters: Any) -> Controller:
@@ -85,15 +82,15 @@ class Autopilot(Part[Any, Controller]):
         """The command for the tick that begins at the estimate's stamp, and how it came about."""
         self.begin_tick(estimate.time)
         command = self._ask(estimate, target)
-        wanted = np.clip(command.force, -self._limit, self._limit)
-        force = self._blend(estimate.time, wanted)
+        wanted, limit = command.force.tolist(), self.parameters.thrust_limit
+        force = self._blend(estimate.time, within(wanted, limit))
         self._note_fallback(estimate.time, command.fallback)
-        self._force = force
-        return Thrust(estimate.time, force), Status(
+        self._force = np.array(force)
+        return Thrust(estimate.time, self._force), Status(
             estimate.time,
             self.parameters.algorithm,
             command.force,
-            [bool(cut) for cut in np.abs(command.force) > self._limit],
+            [abs(value) > most for value, most in zip(wanted, limit, strict=True)],
             command.solver,
             command.iterations,
             command.cost,
@@ -103,31 +100,34 @@ class Autopilot(Part[Any, Controller]):
     def _ask(self, estimate: Estimate, target: Target) -> Command:
         """The law's answer, or no thrust with the reason when there is none to use."""
         for name, state in (("estimate", estimate.relative_state), ("target", target.relative_state)):
-            if not np.isfinite(state).all():
+            if not all(map(isfinite, state.tolist())):
                 return Command(np.zeros(3), fallback=f"{name} not finite: no thrust")
         try:
             with np.errstate(all="ignore"):
                 command = self.configuration.design.command(estimate, target)
         except (ArithmeticError, ValueError) as error:  # LinAlgError is a ValueError
             return Command(np.zeros(3), fallback=f"{type(error).__name__}: {error}: no thrust")
-        if not np.isfinite(command.force).all():
+        if not all(map(isfinite, command.force.tolist())):
             return Command(np.zeros(3), fallback="command not finite: no thrust")
         return command
 
-    def _blend(self, time: int, wanted: Vector) -> Vector:
+    def _blend(self, time: int, wanted: list[float]) -> list[float]:
         """Bound the step at a hand-over, and give back what was withheld."""
-        step = self.parameters.handover_step * self._limit
+        if self._predecessor is None and not any(self._withheld):
+            return wanted
+        limit = self.parameters.thrust_limit
+        step = [self.parameters.handover_step * most for most in limit]
         if self._predecessor is not None:
-            asked = wanted - self._force
-            self._withheld = asked - np.clip(asked, -step, step)
+            asked = _minus(wanted, self._force.tolist())
+            self._withheld = _minus(asked, within(asked, step))
             detail = (
                 f"{self._predecessor} -> {self.parameters.algorithm}: step in force {_newtons(asked)} asked, "
             )
-            self.record(time, "handover", detail + f"{_newtons(asked - self._withheld)} flown")
+            self.record(time, "handover", detail + f"{_newtons(_minus(asked, self._withheld))} flown")
             self._predecessor = None
-        elif self._withheld.any():
-            self._withheld -= np.clip(self._withheld, -step, step)
-        return np.clip(wanted - self._withheld, -self._limit, self._limit)
+        else:
+            self._withheld = _minus(self._withheld, within(self._withheld, step))
+        return within(_minus(wanted, self._withheld), limit)
 
     def _note_fallback(self, time: int, reason: str) -> None:
         """Record when a fallback begins, changes or ends."""
@@ -136,5 +136,14 @@ class Autopilot(Part[Any, Controller]):
             self._fallback = reason
 
 
-def _newtons(force: Vector) -> str:
+def within(values: Sequence[float], limits: Sequence[float]) -> list[float]:
+    """Each value, or the limit of its axis where it is beyond it."""
+    return [min(max(value, -limit), limit) for value, limit in zip(values, limits, strict=True)]
+
+
+def _minus(left: Sequence[float], right: Sequence[float]) -> list[float]:
+    return [one - other for one, other in zip(left, right, strict=True)]
+
+
+def _newtons(force: Sequence[float]) -> str:
     return "[" + ", ".join(f"{component:.3g}" for component in force) + "] N"

@@ -1,6 +1,7 @@
 """Linear quadratic regulator."""
 
 from dataclasses import dataclass
+from math import sumprod
 from typing import Any
 
 import numpy as np
@@ -95,10 +96,10 @@ class LinearQuadraticRegulator(Controller):
         """
         model = DESIGN_MODELS[parameters.model](mission)
         self.tick = mission.tick
-        self._limit, self._mass = vehicle.thrust_limit, vehicle.mass
+        self._limit, self._mass = vehicle.thrust_limit.tolist(), vehicle.mass
         self._integrates = parameters.integral_error > 0.0
         self._feed_forward = FeedForward(parameters.feed_forward, model)
-        self._integral = np.zeros(3)
+        self._integral = [0.0, 0.0, 0.0] if self._integrates else []
         self._start: int | None = None
         try:
             thrust_weight = vehicle.mass**2 * parameters.thrust_matrix()
@@ -189,23 +190,27 @@ class LinearQuadraticRegulator(Controller):
     def take_over(self, handover: Handover) -> None:
         """Keep the integral of an LQR that flew before."""
         if self._integrates and isinstance(handover.law, LinearQuadraticRegulator):
-            self._integral = handover.law._integral.copy()
+            self._integral = handover.law._integral or self._integral
 
     def command(self, estimate: Estimate, target: Target) -> Command:
         """The force that the gain asks for against the estimated error, and what the target needs."""
         if self._start is None:
             self._start = estimate.time
-        gain = self.gain_at(estimate.time)
-        error = estimate.relative_state - target.relative_state
-        acceleration = -gain[:, :6] @ error
-        if self._integrates:
-            acceleration -= gain[:, 6:] @ self._integral
+        error: list[float] = (estimate.relative_state - target.relative_state).tolist()
         wanted, reason = self._feed_forward(estimate, target)
-        force = estimate.mass * (acceleration + wanted)
+        force = [
+            estimate.mass * (given - sumprod(row, error + self._integral))
+            for row, given in zip(self.gain_at(estimate.time).tolist(), wanted.tolist(), strict=True)
+        ]
         if self._integrates:
             # Anti-wind-up: what an axis at its limit cannot give, more integral would not get.
-            self._integral += np.where(np.abs(force) < self._limit, error[:3], 0.0) * self.tick
-        return Command(force, fallback=reason)
+            self._integral = [
+                total + off * self.tick if abs(value) < limit else total
+                for total, off, value, limit in zip(
+                    self._integral, error[:3], force, self._limit, strict=True
+                )
+            ]
+        return Command(np.array(force), fallback=reason)
 
 
 def _with_integral(parameters: LqrParameters) -> Matrix:

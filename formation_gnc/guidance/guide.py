@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, make_dataclass
+from functools import lru_cache
 from itertools import combinations
 from typing import Any
 
@@ -147,8 +148,10 @@ class Guide(Part[Any, TargetPath]):
     def on_tick(self, estimate: Estimate) -> Target:
         """The target at the estimate's stamp and its preview."""
         self.begin_tick(estimate.time)
-        ahead = self.parameters.preview_step * np.arange(self.parameters.preview_steps + 1)
-        states = self.configuration.design.states(estimate.time / NANOSECONDS + ahead)
+        times = estimate.time / NANOSECONDS + _ahead(
+            self.parameters.preview_step, self.parameters.preview_steps
+        )
+        states = self.configuration.design.states(times)
         if self._untold:
             self._untold = False
             self._tell_of_the_model(estimate.time)
@@ -213,6 +216,13 @@ class Guide(Part[Any, TargetPath]):
     def foreseen(self) -> list[int]:
         """Times (ns) of the changes that are scheduled and still to come."""
         return [at for at, _ in self._foreseen]
+
+
+@lru_cache(maxsize=16)
+def _ahead(step: float, steps: int) -> Vector:
+    """(1 + steps,) times (s) of a target and its preview from the tick on."""
+    ahead: Vector = step * np.arange(steps + 1.0)
+    return ahead
 
 
 def check_places(deputies: Mapping[str, Any]) -> None:

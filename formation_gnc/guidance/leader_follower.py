@@ -40,4 +40,4 @@ class LeaderFollower(Formation):
 
     def states(self, times: Vector) -> Matrix:
         """The same state at all times."""
-        return np.tile(self._state, (len(times), 1))
+        return np.full((len(times), 6), self._state)

@@ -12,14 +12,14 @@ from numba.types import Array as NumbaArray
 from numpy.typing import NDArray
 
 from formation_gnc.interface import Sensor
-from formation_gnc.orbit.gravity import ANY_VECTOR, oblate_acceleration
-from formation_gnc.orbit.jit import inline, kernel
+from formation_gnc.orbit.frames import hill_frame, to_inertial, to_relative
+from formation_gnc.orbit.gravity import oblate_acceleration
+from formation_gnc.orbit.jit import ANY_MATRIX, ANY_VECTOR, inline, kernel
 from formation_gnc.orbit.propagation import advance_with_transition
 from formation_gnc.orbit.runge_kutta import COUPLING, STAGES, WEIGHTS
 
 Array = NDArray[np.float64]
 
-_ANY_MATRIX = NumbaArray(float64, 2, "A", readonly=True)
 _SENSORS = NumbaArray(int64, 1, "A", readonly=True)
 
 _RADIUS, _RANGE_RATE, _LATITUDE = int(Sensor.RADIUS), int(Sensor.RANGE_RATE), int(Sensor.LATITUDE)
@@ -54,47 +54,6 @@ def _congruence(matrix: Array, covariance: Array, added: Array) -> Array:
                 total += half[i, k] * matrix[j, k]
             out[i, j] = out[j, i] = total
     return out
-
-
-@inline
-def _hill(chief: Array) -> tuple[Array, float]:
-    """Rotation from inertial to Hill components, and the frame's rate."""
-    rx, ry, rz, vx, vy, vz = chief[0], chief[1], chief[2], chief[3], chief[4], chief[5]
-    hx, hy, hz = ry * vz - rz * vy, rz * vx - rx * vz, rx * vy - ry * vx
-    square = rx * rx + ry * ry + rz * rz
-    radius, momentum = sqrt(square), sqrt(hx * hx + hy * hy + hz * hz)
-    rate = momentum / square
-    rx, ry, rz = rx / radius, ry / radius, rz / radius
-    hx, hy, hz = hx / momentum, hy / momentum, hz / momentum
-    axes = np.empty((3, 3))
-    axes[0, 0], axes[0, 1], axes[0, 2] = rx, ry, rz
-    axes[1, 0], axes[1, 1], axes[1, 2] = hy * rz - hz * ry, hz * rx - hx * rz, hx * ry - hy * rx
-    axes[2, 0], axes[2, 1], axes[2, 2] = hx, hy, hz
-    return axes, rate
-
-
-@inline
-def _to_inertial(axes: Array, rate: float, chief: Array, relative: Array) -> Array:
-    vx, vy, vz = relative[3] - rate * relative[1], relative[4] + rate * relative[0], relative[5]
-    deputy = np.empty(6)
-    for c in range(3):
-        deputy[c] = chief[c] + relative[0] * axes[0, c] + relative[1] * axes[1, c] + relative[2] * axes[2, c]
-        deputy[3 + c] = chief[3 + c] + vx * axes[0, c] + vy * axes[1, c] + vz * axes[2, c]
-    return deputy
-
-
-@inline
-def _to_relative(axes: Array, rate: float, chief: Array, deputy: Array) -> Array:
-    relative = np.empty(6)
-    for i in range(3):
-        position, velocity = 0.0, 0.0
-        for c in range(3):
-            position += axes[i, c] * (deputy[c] - chief[c])
-            velocity += axes[i, c] * (deputy[3 + c] - chief[3 + c])
-        relative[i], relative[3 + i] = position, velocity
-    relative[3] += rate * relative[1]
-    relative[4] -= rate * relative[0]
-    return relative
 
 
 @inline
@@ -180,7 +139,7 @@ def follow(
     return flown, False
 
 
-@kernel((ANY_VECTOR, ANY_VECTOR, ANY_VECTOR, _ANY_MATRIX, _ANY_MATRIX, ANY_VECTOR, float64, int64))
+@kernel((ANY_VECTOR, ANY_VECTOR, ANY_VECTOR, ANY_MATRIX, ANY_MATRIX, ANY_VECTOR, float64, int64))
 def fly(
     chief: Array,
     next_chief: Array,
@@ -211,41 +170,41 @@ def fly(
     Returns:
         Relative state, its covariance, and the transition matrix (6, 6).
     """
-    axes, rate = _hill(chief)
+    axes, rate = hill_frame(chief)
     thrust = np.empty(3)
     for c in range(3):
         thrust[c] = acceleration[0] * axes[0, c] + acceleration[1] * axes[1, c] + acceleration[2] * axes[2, c]
-    deputy, flight = advance_with_transition(_to_inertial(axes, rate, chief, state), thrust, tick, substeps)
-    next_axes, next_rate = _hill(next_chief)
+    deputy, flight = advance_with_transition(to_inertial(axes, rate, chief, state), thrust, tick, substeps)
+    next_axes, next_rate = hill_frame(next_chief)
     transition = _product(_product(_transform(next_axes, next_rate), flight), _transform_inverse(axes, rate))
     return (
-        _to_relative(next_axes, next_rate, _coast(chief, 0.0, 0.0, 0.0, tick, substeps), deputy),
+        to_relative(next_axes, next_rate, _coast(chief, 0.0, 0.0, 0.0, tick, substeps), deputy),
         _congruence(transition, covariance, noise),
         transition,
     )
 
 
-@kernel((ANY_VECTOR, ANY_VECTOR, _ANY_MATRIX, ANY_VECTOR, float64, int64))
+@kernel((ANY_VECTOR, ANY_VECTOR, ANY_MATRIX, ANY_VECTOR, float64, int64))
 def fly_points(
     chief: Array, next_chief: Array, points: Array, acceleration: Array, tick: float, substeps: int
 ) -> Array:
     """Relative states (N, 6) a tick later, as `fly` moves one."""
-    axes, rate = _hill(chief)
+    axes, rate = hill_frame(chief)
     thrust = np.empty(3)
     for c in range(3):
         thrust[c] = acceleration[0] * axes[0, c] + acceleration[1] * axes[1, c] + acceleration[2] * axes[2, c]
-    next_axes, next_rate = _hill(next_chief)
+    next_axes, next_rate = hill_frame(next_chief)
     flown = _coast(chief, 0.0, 0.0, 0.0, tick, substeps)
     out = np.empty((points.shape[0], 6))
     for index in range(points.shape[0]):
         deputy = _coast(
-            _to_inertial(axes, rate, chief, points[index]), thrust[0], thrust[1], thrust[2], tick, substeps
+            to_inertial(axes, rate, chief, points[index]), thrust[0], thrust[1], thrust[2], tick, substeps
         )
-        out[index] = _to_relative(next_axes, next_rate, flown, deputy)
+        out[index] = to_relative(next_axes, next_rate, flown, deputy)
     return out
 
 
-@kernel((_ANY_MATRIX, _ANY_MATRIX, _ANY_MATRIX))
+@kernel((ANY_MATRIX, ANY_MATRIX, ANY_MATRIX))
 def spread(transition: Array, covariance: Array, noise: Array) -> Array:
     """F P F' + Q, symmetric to the last bit."""
     return _congruence(transition, covariance, noise)
@@ -312,8 +271,8 @@ def read(sensors: NDArray[np.int64], deputy: Array, chief: Array) -> tuple[Array
 @kernel((_SENSORS, ANY_VECTOR, ANY_VECTOR))
 def read_relative(sensors: NDArray[np.int64], chief: Array, state: Array) -> tuple[Array, Array]:
     """As `read`, from and with respect to the relative state (6,)."""
-    axes, rate = _hill(chief)
-    readings, jacobian = _read(sensors, _to_inertial(axes, rate, chief, state), chief)
+    axes, rate = hill_frame(chief)
+    readings, jacobian = _read(sensors, to_inertial(axes, rate, chief, state), chief)
     return readings, _product(jacobian, _transform_inverse(axes, rate))
 
 
@@ -321,12 +280,12 @@ def read_relative(sensors: NDArray[np.int64], chief: Array, state: Array) -> tup
 def relative_to(chief: Array, state: Array, other: Array) -> Array:
     """The relative state (6,) about another chief of a deputy with `state` about `chief`, both inertial
     (6,)."""
-    axes, rate = _hill(chief)
-    other_axes, other_rate = _hill(other)
-    return _to_relative(other_axes, other_rate, other, _to_inertial(axes, rate, chief, state))
+    axes, rate = hill_frame(chief)
+    other_axes, other_rate = hill_frame(other)
+    return to_relative(other_axes, other_rate, other, to_inertial(axes, rate, chief, state))
 
 
-@kernel((_ANY_MATRIX, _ANY_MATRIX, ANY_VECTOR, float64))
+@kernel((ANY_MATRIX, ANY_MATRIX, ANY_VECTOR, float64))
 def carry(transition: Array, since: Array, direction: Array, mean_motion: float) -> tuple[Array, Array]:
     """Compose a transition (6, 6) with an earlier one, and move a direction along with it.
 
@@ -348,7 +307,7 @@ def carry(transition: Array, since: Array, direction: Array, mean_motion: float)
     return _product(transition, since), moved
 
 
-@kernel((_ANY_MATRIX, _ANY_MATRIX, _ANY_MATRIX, ANY_VECTOR))
+@kernel((ANY_MATRIX, ANY_MATRIX, ANY_MATRIX, ANY_VECTOR))
 def inform(total: Array, jacobian: Array, since: Array, variance: Array) -> Array:
     """A Gramian (6, 6) with (H Phi)' R^-1 (H Phi) added: H (k, 6), variances (k,)."""
     rows = _product(jacobian, since)
@@ -362,7 +321,7 @@ def inform(total: Array, jacobian: Array, since: Array, variance: Array) -> Arra
     return out
 
 
-@kernel((_ANY_MATRIX, _ANY_MATRIX, ANY_VECTOR))
+@kernel((ANY_MATRIX, ANY_MATRIX, ANY_VECTOR))
 def variances(jacobian: Array, covariance: Array, noise: Array) -> Array:
     """Variance (k,) of each of k readings: diagonal of H P H' with H (k, 6), plus their noise (k,)."""
     half = _product(jacobian, covariance)
@@ -373,7 +332,7 @@ def variances(jacobian: Array, covariance: Array, noise: Array) -> Array:
     return out
 
 
-@kernel((ANY_VECTOR, _ANY_MATRIX))
+@kernel((ANY_VECTOR, ANY_MATRIX))
 def sound(state: Array, covariance: Array) -> bool:
     """Whether a state (6,) and its covariance (6, 6) are finite."""
     total = 0.0
@@ -384,7 +343,7 @@ def sound(state: Array, covariance: Array) -> bool:
     return total == 0.0
 
 
-@kernel((_ANY_MATRIX,))
+@kernel((ANY_MATRIX,))
 def settle(covariance: Array) -> tuple[Array, bool]:
     """A covariance made symmetric, and positive definite if rounding has taken that from it.
 

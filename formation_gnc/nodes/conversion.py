@@ -13,8 +13,6 @@ from formation_gnc import interface
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.interface import NANOSECONDS
 
-_FIELDS: dict[type[Any], "tuple[_Field, ...]"] = {}
-
 FRAME_IDS = {
     interface.Measurement: "inertial",
     interface.Truth: "inertial",
@@ -34,6 +32,19 @@ class _Field:
     decode: Callable[[Any], Any] | None
 
 
+@dataclasses.dataclass(frozen=True, slots=True)
+class _Codec:
+    """How a record becomes its message, and back."""
+
+    fields: tuple[_Field, ...]
+    message_type: Any
+    frame_id: str | None
+    """None for a record without a time, whose message has no header."""
+
+
+_CODECS: dict[type[Any], _Codec] = {}
+
+
 def message_type(record_type: type[Any]) -> Any:
     """The message class of the same name."""
     return getattr(messages, record_type.__name__)
@@ -48,29 +59,38 @@ def message_class(type_name: str) -> Any:
         raise ConfigurationError(f"message type {type_name!r} is not installed") from None
 
 
+def blank(record_type: type[Any]) -> Any:
+    """A message of the same name, in its frame, to be filled again and again."""
+    codec = _codec(record_type)
+    message = codec.message_type()
+    if codec.frame_id:
+        message.header.frame_id = codec.frame_id
+    return message
+
+
 def to_message(record: Any, message: Any = None) -> Any:
-    """A ROS message with the contents of a record, header included; an old `message` may be used again."""
-    kind = type(record)
-    message = message or message_type(kind)()
-    for field in _fields(kind):
+    """A ROS message with the contents of a record, header included; a `blank` message may be used again."""
+    codec = _codec(type(record))
+    message = message or blank(type(record))
+    for field in codec.fields:
         value = getattr(record, field.name)
         setattr(message, field.name, field.encode(value) if field.encode else value)
-    if hasattr(record, "time"):
-        header = message.header
-        header.stamp.sec, header.stamp.nanosec = divmod(record.time, NANOSECONDS)
-        header.frame_id = FRAME_IDS.get(kind, "")
+    if codec.frame_id is not None:
+        time = message.header.stamp
+        time.sec, time.nanosec = divmod(record.time, NANOSECONDS)
     return message
 
 
 def from_message[T](record_type: type[T], message: Any) -> T:
     """The record with the contents of a ROS message."""
+    codec = _codec(record_type)
     values = {
         field.name: field.decode(getattr(message, field.name))
         if field.decode
         else getattr(message, field.name)
-        for field in _fields(record_type)
+        for field in codec.fields
     }
-    if hasattr(message, "header"):
+    if codec.frame_id is not None:
         values["time"] = stamp(message)
     return record_type(**values)
 
@@ -81,16 +101,22 @@ def stamp(message: Any) -> int:
     return int(time.sec * NANOSECONDS + time.nanosec)
 
 
-def _fields(record_type: type[Any]) -> tuple[_Field, ...]:
-    if record_type not in _FIELDS:
-        _FIELDS[record_type] = _analyse(record_type)
-    return _FIELDS[record_type]
+def _codec(record_type: type[Any]) -> _Codec:
+    if record_type not in _CODECS:
+        _CODECS[record_type] = _analyse(record_type)
+    return _CODECS[record_type]
 
 
-def _analyse(record_type: type[Any]) -> tuple[_Field, ...]:
+def _analyse(record_type: type[Any]) -> _Codec:
     hints = get_type_hints(record_type)
-    return tuple(
-        _field(field, hints[field.name]) for field in dataclasses.fields(record_type) if field.name != "time"
+    return _Codec(
+        tuple(
+            _field(field, hints[field.name])
+            for field in dataclasses.fields(record_type)
+            if field.name != "time"
+        ),
+        message_type(record_type),
+        FRAME_IDS.get(record_type, "") if "time" in hints else None,
     )
 
 
@@ -103,7 +129,7 @@ def _field(field: Any, kind: Any) -> _Field:
             lambda value: np.array(value, dtype=np.float64).reshape(shape),
         )
     if shape:
-        return _Field(field.name, np.ravel, lambda value: value.reshape(shape))
+        return _Field(field.name, lambda value: value.reshape(-1), lambda value: value.reshape(shape))
     if get_origin(kind) is list and dataclasses.is_dataclass(get_args(kind)[0]):
         (item,) = get_args(kind)
         return _Field(

@@ -42,6 +42,7 @@ class PlantNode(ConfiguredNode):
         }
         self._truth = self.speak(Truth, topics.TRUTH)
         self._events = self.speak(Event, topics.EVENTS)
+        self._clock = Clock()
         self._tell_time = self.create_publisher(Clock, topics.CLOCK, topics.quality())
         self._diagnostics = self.create_publisher(DiagnosticArray, topics.DIAGNOSTICS, topics.quality())
         for name in self.values.deputies:
@@ -144,9 +145,8 @@ class PlantNode(ConfiguredNode):
         for name, measurement in self.plant.measure().items():  # first, since everybody waits for them
             self._measurement[name](measurement)
         self._truth(self.plant.truth())
-        clock = Clock()
-        clock.clock.sec, clock.clock.nanosec = divmod(self.plant.time, NANOSECONDS)
-        self._tell_time.publish(clock)
+        self._clock.clock.sec, self._clock.clock.nanosec = divmod(self.plant.time, NANOSECONDS)
+        self._tell_time.publish(self._clock)
 
     def _tell_event(self, time: int, tick: int, kind: str, detail: str) -> None:
         self._events(Event(time, tick, self.get_fully_qualified_name(), kind, detail))

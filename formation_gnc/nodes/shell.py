@@ -11,7 +11,6 @@ from time import monotonic, perf_counter
 from typing import Any
 
 import rclpy
-from formation_gnc_msgs.msg import Timing
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, RMWError, UnknownROSArgsError
 from rclpy.duration import Duration
@@ -21,7 +20,6 @@ from rclpy.parameter import Parameter
 from rclpy.service import Service
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
-from std_msgs.msg import Header
 
 try:
     from rclpy.experimental import EventsExecutor
@@ -29,9 +27,9 @@ except ImportError:  # other builds of Jazzy do not have it; theirs is slower an
     EventsExecutor = SingleThreadedExecutor
 
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.interface import Event
+from formation_gnc.interface import Event, Timing
 from formation_gnc.nodes import topics
-from formation_gnc.nodes.conversion import from_message, message_type, to_message
+from formation_gnc.nodes.conversion import blank, from_message, message_type, to_message
 from formation_gnc.orbit.propagation import ImpactError
 from formation_gnc.parameters import OWN_OF_ROS, Leaf, dump, leaves, load, read_yaml
 from formation_gnc.part import Part
@@ -93,7 +91,7 @@ class ConfiguredNode(Node):  # type: ignore[misc]
     def speak(self, record: type, topic: str) -> Callable[[Any], None]:
         """A function that publishes a record on a topic."""
         publisher = self.create_publisher(message_type(record), topic, topics.quality())
-        message = message_type(record)()
+        message = blank(record)
         return lambda each: publisher.publish(to_message(each, message))
 
     def spin(
@@ -158,9 +156,10 @@ class PartNode[P: Part[Any, Any]](ConfiguredNode):
         """Build the part from the node's parameters; the namespace is deputy1 unless it is remapped."""
         super().__init__(name, schema, namespace="deputy1")
         self.part = part(self.get_fully_qualified_name(), self.values)
-        self._answered: set[int] = set()
+        self._answered: int | None = None
+        self._kind = self.get_name()
         self._tell_event = self.speak(Event, topics.EVENTS)
-        self._timing = self.create_publisher(Timing, topics.TIMING, topics.quality())
+        self._tell_timing = self.speak(Timing, topics.TIMING)
         self._designer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="design")
         self.add_on_set_parameters_callback(self._on_set_parameters)
         for service in self.services:
@@ -175,22 +174,18 @@ class PartNode[P: Part[Any, Any]](ConfiguredNode):
             def receive(message: Any, topic: str = topic, record: type = record) -> None:
                 started = perf_counter()
                 latest[topic] = from_message(record, message)
-                times = {each.time for each in latest.values()}
-                if len(latest) < len(inputs) or len(times) > 1 or times == self._answered:
+                times = [each.time for each in latest.values()]
+                if times.count(times[0]) < len(inputs) or times[0] == self._answered:
                     return
-                self._answered = times
+                self._answered = times[0]
                 respond(*(latest[topic] for topic in inputs))
-                self._finish_tick(message.header, started)
+                self._finish_tick(times[0], started)
 
             self.create_subscription(message_type(record), topic, receive, topics.quality(topics.LATEST))
 
-    def _finish_tick(self, header: Any, started: float) -> None:
+    def _finish_tick(self, time: int, started: float) -> None:
         """Publish what nobody waits for: the events, and the wall time that the answer took."""
-        self._timing.publish(
-            Timing(
-                header=Header(stamp=header.stamp), node=self.get_name(), compute_time=perf_counter() - started
-            )
-        )
+        self._tell_timing(Timing(time, self._kind, perf_counter() - started))
         for event in self.part.take_events():
             self.get_logger().info(f"tick {event.tick}: {event.kind}: {event.detail}")
             self._tell_event(event)

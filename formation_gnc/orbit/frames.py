@@ -19,8 +19,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation_gnc.errors import ConfigurationError
+from formation_gnc.orbit.jit import ANY_MATRIX, ANY_VECTOR, inline, kernel
 
 Array = NDArray[np.float64]
+
+
+@inline
+def hill_frame(chief: Array) -> tuple[Array, float]:
+    """`hill_rotation` and `hill_rate` for use inside kernels; not numbers where there is no orbit plane."""
+    rx, ry, rz, vx, vy, vz = chief[0], chief[1], chief[2], chief[3], chief[4], chief[5]
+    hx, hy, hz = ry * vz - rz * vy, rz * vx - rx * vz, rx * vy - ry * vx
+    square = rx * rx + ry * ry + rz * rz
+    radius, momentum = sqrt(square), sqrt(hx * hx + hy * hy + hz * hz)
+    rate = momentum / square
+    rx, ry, rz = rx / radius, ry / radius, rz / radius
+    hx, hy, hz = hx / momentum, hy / momentum, hz / momentum
+    axes = np.empty((3, 3))
+    axes[0, 0], axes[0, 1], axes[0, 2] = rx, ry, rz
+    axes[1, 0], axes[1, 1], axes[1, 2] = hy * rz - hz * ry, hz * rx - hx * rz, hx * ry - hy * rx
+    axes[2, 0], axes[2, 1], axes[2, 2] = hx, hy, hz
+    return axes, rate
 
 
 def hill_rotation(chief: Array) -> Array:
@@ -77,6 +95,27 @@ def hill_angular_velocity(chief: Array, acceleration: Array) -> Array:
     radius = sqrt(sum(float(r) ** 2 for r in chief[:3]))
     out_of_plane = float(hill_rotation(chief)[2] @ acceleration)
     return np.array([out_of_plane / (radius * rate), 0.0, rate])
+
+
+@kernel((ANY_VECTOR, ANY_MATRIX, ANY_VECTOR))
+def inertial_acceleration(chief: Array, forces: Array, masses: Array) -> Array:
+    """Accelerations by forces along the chief's Hill axes.
+
+    Args:
+        chief: inertial state of the chief, (6,), m and m/s.
+        forces: one for each satellite, (N, 3), Hill frame, N.
+        masses: of the satellites, (N,), kg.
+
+    Returns:
+        (N, 3), inertial frame, m/s^2.
+    """
+    axes, _ = hill_frame(chief)
+    out = np.empty(forces.shape)
+    for k in range(len(masses)):
+        x, y, z = forces[k, 0] / masses[k], forces[k, 1] / masses[k], forces[k, 2] / masses[k]
+        for c in range(3):
+            out[k, c] = x * axes[0, c] + y * axes[1, c] + z * axes[2, c]
+    return out
 
 
 def hill_transform(chief: Array) -> Array:
@@ -143,3 +182,46 @@ def inertial_from_relative(chief: Array, relative: Array) -> Array:
     deputy[:3] = chief[:3] + relative[:3] @ rotation
     deputy[3:] = chief[3:] + velocity @ rotation
     return deputy
+
+
+@inline
+def to_inertial(axes: Array, rate: float, chief: Array, relative: Array) -> Array:
+    """`inertial_from_relative` for use inside kernels, with the `hill_frame` of the chief."""
+    vx, vy, vz = relative[3] - rate * relative[1], relative[4] + rate * relative[0], relative[5]
+    deputy = np.empty(6)
+    for c in range(3):
+        deputy[c] = chief[c] + relative[0] * axes[0, c] + relative[1] * axes[1, c] + relative[2] * axes[2, c]
+        deputy[3 + c] = chief[3 + c] + vx * axes[0, c] + vy * axes[1, c] + vz * axes[2, c]
+    return deputy
+
+
+@inline
+def to_relative(axes: Array, rate: float, chief: Array, deputy: Array) -> Array:
+    """`relative_from_inertial` for use inside kernels, with the `hill_frame` of the chief."""
+    relative = np.empty(6)
+    for i in range(3):
+        position, velocity = 0.0, 0.0
+        for c in range(3):
+            position += axes[i, c] * (deputy[c] - chief[c])
+            velocity += axes[i, c] * (deputy[3 + c] - chief[3 + c])
+        relative[i], relative[3 + i] = position, velocity
+    relative[3] += rate * relative[1]
+    relative[4] -= rate * relative[0]
+    return relative
+
+
+@kernel((ANY_MATRIX,))
+def relative_to_first(states: Array) -> Array:
+    """Relative states of all satellites in the Hill frame of the first, as `relative_from_inertial`.
+
+    Args:
+        states: inertial, (N, 6), m and m/s; the first is the chief's, and has an orbit plane.
+
+    Returns:
+        (N - 1, 6), m and m/s.
+    """
+    axes, rate = hill_frame(states[0])
+    out = np.empty((len(states) - 1, 6))
+    for k in range(1, len(states)):
+        out[k - 1] = to_relative(axes, rate, states[0], states[k])
+    return out

@@ -2,16 +2,12 @@
 
 from math import sqrt
 
-import numba
 import numpy as np
 from numba import float64
 from numpy.typing import NDArray
 
 from formation_gnc.orbit.constants import EARTH_RADIUS, J2, MU
-from formation_gnc.orbit.jit import inline, kernel
-
-ANY_VECTOR = numba.types.Array(float64, 1, "A", readonly=True)
-"""Numba type of a vector argument, contiguous or not, writable or not."""
+from formation_gnc.orbit.jit import ANY_VECTOR, inline, kernel
 
 _J2_STRENGTH = 1.5 * J2 * MU * EARTH_RADIUS**2
 

@@ -15,6 +15,12 @@ from typing import Any
 
 import numba
 
+ANY_VECTOR = numba.types.Array(numba.float64, 1, "A", readonly=True)
+"""Numba type of a vector argument, contiguous or not, writable or not."""
+
+ANY_MATRIX = numba.types.Array(numba.float64, 2, "A", readonly=True)
+"""The same of a matrix."""
+
 _HERE = Path(__file__).resolve().parent
 
 

@@ -6,7 +6,6 @@ Fixed steps of order eight: the same input gives the same bits, and the end of a
 from collections.abc import Sequence
 from math import inf, isfinite
 
-import numba
 import numpy as np
 from numba import float64, int64
 from numpy.typing import NDArray
@@ -15,22 +14,20 @@ from formation_gnc.errors import ConfigurationError
 from formation_gnc.orbit.constants import EARTH_RADIUS
 from formation_gnc.orbit.forces import SKY, Body, Forces, acceleration, look_up
 from formation_gnc.orbit.forces.radiation import illumination
-from formation_gnc.orbit.gravity import ANY_VECTOR, oblate_acceleration, oblate_gradient
-from formation_gnc.orbit.jit import kernel
+from formation_gnc.orbit.gravity import oblate_acceleration, oblate_gradient
+from formation_gnc.orbit.jit import ANY_MATRIX, ANY_VECTOR, kernel
 from formation_gnc.orbit.runge_kutta import COUPLING, INSTANT_OF_STAGE, INSTANTS, STAGES, WEIGHTS
 from formation_gnc.orbit.sky import sun
 from formation_gnc.parameters import leaves
 
 Array = NDArray[np.float64]
 
-_ANY_MATRIX = numba.types.Array(float64, 2, "A", readonly=True)
-
 
 class ImpactError(RuntimeError):
     """A satellite has come down: its state lies below the Earth's surface, or is not a number."""
 
 
-@kernel((_ANY_MATRIX, _ANY_MATRIX, ANY_VECTOR, float64[:, ::1], int64[::1], float64, float64, int64))
+@kernel((ANY_MATRIX, ANY_MATRIX, ANY_VECTOR, float64[:, ::1], int64[::1], float64, float64, int64))
 def _advance(
     states: Array,
     thrust: Array,

@@ -11,7 +11,12 @@ from formation_gnc.interface import NANOSECONDS, Event, Measurement, SatelliteTr
 from formation_gnc.mission import LAST_SECOND, Mission
 from formation_gnc.orbit.elements import Elements, elements_from_state, state_from_elements
 from formation_gnc.orbit.forces import Body, Forces
-from formation_gnc.orbit.frames import hill_rotation, inertial_from_relative, relative_from_inertial
+from formation_gnc.orbit.frames import (
+    inertial_acceleration,
+    inertial_from_relative,
+    relative_from_inertial,
+    relative_to_first,
+)
 from formation_gnc.orbit.propagation import Propagator
 from formation_gnc.parameters import parameter, per_name
 from formation_gnc.plant.sensors import Sensors, SensorSuite
@@ -86,6 +91,8 @@ class PlantParameters(Mission):
 
 NO_FIX = np.zeros(6)
 NO_FIX.setflags(write=False)
+NO_FORCE = np.zeros(3)
+NO_FORCE.setflags(write=False)
 
 
 @dataclass
@@ -174,19 +181,20 @@ class Plant:
 
     def truth(self) -> Truth:
         """The truth at the current tick; after `measure`."""
-        chief = self._states[0]
         deputies = [
             SatelliteTruth(
                 satellite.name,
                 state,
-                relative_from_inertial(chief, state),
+                relative,
                 satellite.force,
                 satellite.state.mass,
                 satellite.eclipse,
             )
-            for satellite, state in zip(self._satellites, self._states[1:], strict=True)
+            for satellite, state, relative in zip(
+                self._satellites, self._states[1:], relative_to_first(self._states), strict=True
+            )
         ]
-        return Truth(self.time, chief, deputies)
+        return Truth(self.time, self._states[0], deputies)
 
     def step(self, forces: Mapping[str, Vector]) -> list[str]:
         """Fly one tick under the deputies' forces (3,), Hill frame, N; after `measure`.
@@ -200,25 +208,25 @@ class Plant:
         Raises:
             ImpactError: a satellite has come down.
         """
-        rotation = hill_rotation(self._states[0])
-        accelerations = np.zeros_like(self._states[:, :3])
         masses = np.array([self.parameters.chief_body.mass, *(each.state.mass for each in self._satellites)])
-        for satellite, acceleration, mass in zip(
-            self._satellites, accelerations[1:], masses[1:], strict=True
-        ):
-            force = forces.get(satellite.name)
-            satellite.missed = force is None or not np.isfinite(force).all()
+        thrust = np.zeros((len(masses), 3))
+        for satellite, given in zip(self._satellites, thrust[1:], strict=True):
+            force = forces.get(satellite.name, NO_FORCE).tolist()
+            satellite.missed = satellite.name not in forces or not all(map(math.isfinite, force))
             satellite.force, satellite.state, denied = satellite.thruster.apply(
-                np.zeros(3) if force is None else force, satellite.eclipse, satellite.state
+                force, satellite.eclipse, satellite.state
             )
-            self._note(satellite, tuple(reason for reason in denied if reason is not Denial.NOT_FINITE))
-            acceleration[:] = satellite.force @ rotation / mass
+            if denied != satellite.denied:
+                self._note(satellite, denied)
+            given[:] = satellite.force
+        accelerations = inertial_acceleration(self._states[0], thrust, masses)
         self._states = self._propagator.advance(self.time / NANOSECONDS, self._states, accelerations, masses)
         self.tick += 1
         return [satellite.name for satellite in self._satellites if satellite.missed]
 
     def _note(self, satellite: _Satellite, denied: tuple[Denial, ...]) -> None:
         """Note it when the reasons change for which a deputy's thrusters do not give what is asked."""
+        denied = tuple(reason for reason in denied if reason is not Denial.NOT_FINITE)
         if denied != satellite.denied:
             satellite.denied = denied
             detail = f"{satellite.name}: {', '.join(denied) or 'as commanded again'}"

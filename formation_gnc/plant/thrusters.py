@@ -1,5 +1,6 @@
 """What a deputy's thrusters make of a command."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from math import copysign, exp, hypot, isfinite
@@ -134,7 +135,7 @@ class Thruster:
         return ThrusterState(mass)
 
     def apply(
-        self, command: Vector, eclipse: bool, state: ThrusterState
+        self, command: Sequence[float] | Vector, eclipse: bool, state: ThrusterState
     ) -> tuple[Vector, ThrusterState, tuple[Denial, ...]]:
         """Fire for one tick.
 
@@ -189,11 +190,11 @@ class Thruster:
                 reasons.append(Denial.LIMIT)
                 value = copysign(limit, value)
             output.append(value)
-        total = hypot(*output)
-        if 0.0 < limits.total_limit < total:
+        if 0.0 < limits.total_limit < (total := hypot(*output)):
             reasons.append(Denial.LIMIT)
             output = [value * limits.total_limit / total for value in output]
-        for axis, value in enumerate(output):
+        coarse = limits.quantum > 0.0 or limits.dead_band > 0.0 or limits.minimum_impulse > 0.0
+        for axis, value in enumerate(output if coarse else ()):
             level = abs(value)
             if limits.quantum > 0.0:
                 # Towards zero where rounding would break the limit.
