@@ -1,5 +1,6 @@
 """All control laws by name: a new law is one file and one line here."""
 
+from formation_gnc.control.adaptive_lqr import AdaptiveLinearQuadraticRegulator
 from formation_gnc.control.asre import Asre
 from formation_gnc.control.coast import Coast
 from formation_gnc.control.controller import Controller
@@ -21,4 +22,5 @@ ALGORITHMS: dict[str, type[Controller]] = {
     "sdre": Sdre,
     "sdre_finite": FiniteSdre,
     "asre": Asre,
+    "adaptive_lqr": AdaptiveLinearQuadraticRegulator,
 }

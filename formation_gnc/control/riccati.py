@@ -190,14 +190,25 @@ def continuous_gain(dynamics: Matrix, inputs: Matrix, weights: Weights) -> Matri
     Raises:
         DesignError: no stabilising solution.
     """
+    p, b = continuous_cost_to_go(dynamics, inputs, weights)
+    gain = np.asarray(np.linalg.solve(weights.input, b.T @ p))
+    return gain * np.outer(weights.input_unit, 1.0 / weights.state_unit)
+
+
+def continuous_cost_to_go(dynamics: Matrix, inputs: Matrix, weights: Weights) -> tuple[Matrix, Matrix]:
+    """Scaled cost-to-go P (n, n) behind `continuous_gain`, and B scaled likewise.
+
+    Time counts in units of 1 / rate, with the rate the root of `weights.input_unit`.
+
+    Raises:
+        DesignError: no stabilising solution.
+    """
     rate = np.sqrt(weights.input_unit[0])
-    a, b = weights.step(dynamics, inputs)
+    a, b = (each / rate for each in weights.step(dynamics, inputs))
     try:
-        p = solve_continuous_are(a / rate, b / rate, weights.state, weights.input)
+        return solve_continuous_are(a, b, weights.state, weights.input), b
     except (LinAlgError, ValueError) as error:
         raise DesignError(f"the Riccati equation has no stabilising solution ({error})") from error
-    gain: Matrix = np.linalg.solve(weights.input, (b / rate).T @ p)
-    return gain * np.outer(weights.input_unit, 1.0 / weights.state_unit)
 
 
 def finite_gains(phi: Matrix, gamma: Matrix, weights: Weights, terminal_weight: Matrix, steps: int) -> Matrix:
