@@ -28,8 +28,7 @@ from formation_gnc.orbit.frames import hill_rotation, inertial_from_relative, re
 from formation_gnc.orbit.propagation import advance_with_transition
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.schweighart_sedwick import CircularReference, SchweighartSedwickModel
-from formation_gnc.sil.runner import Run
-from formation_gnc.sil.scenario import load_scenario
+from verification.laws import all_laws
 from verification.relative_motion import TABLE, Figure, failures
 
 mpl.use("Agg")
@@ -473,74 +472,6 @@ def kremmydas(directory: Path) -> tuple[str, list[Figure]]:
         ),
     ]
     lines += ["", TABLE, *(figure.row for figure in figures), "", "![Kremmydas](control_kremmydas.png)", ""]
-    return "\n".join(lines), figures
-
-
-LAWS: dict[str, dict[str, object]] = {
-    "coast": {"algorithm": "coast"},
-    "LQR": {"algorithm": "lqr"},
-    "LQR, periodic on J2": {"algorithm": "lqr", "lqr.model": "j2_gradient", "lqr.gain": "periodic"},
-    "LQR, nonlinear feed-forward": {"algorithm": "lqr", "lqr.feed_forward": "nonlinear"},
-    "H-infinity": {"algorithm": "hinf"},
-    "H-infinity, full information": {"algorithm": "hinf", "hinf.form": "full_information"},
-    "MPC": {
-        "algorithm": "mpc",
-        "mpc.position_error": (10.0,) * 3,
-        "mpc.velocity_error": (0.1,) * 3,
-        "mpc.thrust": (0.002,) * 3,
-    },
-}
-"""What each law flies with, on top of the scenario's parameters."""
-
-PREVIEW = {"preview_steps": 1}
-"""For the feed-forward; nobody else's command changes with it about a target at rest."""
-
-
-def all_laws(directory: Path) -> tuple[str, list[Figure]]:
-    """Every law on the default scenario, on the truth and on estimates."""
-    lines = [
-        "## All laws on the scenario leader_follower",
-        "",
-        "True position against target over three orbits, J2 truth, 100 kg, 10 mN, ticks of 1 s; RMS over",
-        "the last orbit. LQR and MPC have the scenario's weights, H-infinity its defaults.",
-        "",
-        "| law | knows | final error, m | RMS, m | delta-v, mm/s | last orbit | peak, mN | limited, % |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
-    figures = []
-    for name, parameters in LAWS.items():
-        for knows in ("truth", "estimate"):
-            run = Run(
-                load_scenario("leader_follower", {"/**/controller": parameters, "/**/guidance": PREVIEW})
-            )
-            satellite = run.satellites[0]
-            errors, forces, limited = [], [], 0
-            while not run.plant.finished:
-                truth, measurements = run.plant.observe()
-                state = truth.deputies[0].relative_state
-                seen = satellite.navigator.on_tick(measurements[satellite.name])
-                if seen is None:
-                    raise RuntimeError("the filter gives no estimate")
-                if knows == "truth":
-                    seen = replace(seen, relative_state=state)
-                target = satellite.guide.on_tick(seen)
-                thrust, status = satellite.autopilot.on_tick(seen, target)
-                errors.append(state - target.relative_state)
-                forces.append(thrust.force)
-                limited += any(status.saturated)
-                run.plant.step({satellite.name: thrust.force})
-            size = np.linalg.norm(np.array(errors)[:, :3], axis=1)
-            force, last = np.abs(forces), len(size) // 3
-            rms = math.sqrt(float(np.mean(size[-last:] ** 2)))
-            share = 100.0 * limited / len(size)
-            lines.append(
-                f"| {name} | {knows} | {size[-1]:.3g} | {rms:.3g} | {10.0 * force.sum():.1f} | "
-                f"{10.0 * force[-last:].sum():.2f} | {1e3 * force.max():.2f} | {share:.1f} |"
-            )
-            if name != "coast":
-                most = 0.5 if knows == "truth" else 1.5
-                figures.append(Figure(f"{name}, on {knows}: RMS error", "(required)", rms, "m", 0.0, most))
-    lines += ["", TABLE, *(figure.row for figure in figures), ""]
     return "\n".join(lines), figures
 
 

@@ -1,0 +1,254 @@
+"""Every law on every scenario, on the truth and on estimates: one table, and which of its figures have moved.
+
+`python -m verification.laws [SCENARIO or LAW ...]` flies all or the named ones and writes `laws.csv`, with
+which later figures are compared: to be done when a change is meant to change the flights, and what changed to
+be looked at before it is committed.
+"""
+
+import csv
+import sys
+from dataclasses import astuple, dataclass, fields
+from itertools import groupby, product
+from operator import itemgetter
+from pathlib import Path
+from time import thread_time
+from typing import Any
+
+import numpy as np
+
+from formation_gnc.control.registry import ALGORITHMS
+from formation_gnc.interface import Estimate, EstimateStatus, Measurement
+from formation_gnc.plant.plant import Plant
+from formation_gnc.sil.runner import Run
+from formation_gnc.sil.scenario import find_scenario, load_scenario
+from verification.relative_motion import TABLE, Figure
+
+SCENARIOS = find_scenario("leader_follower").parent
+EXPECTED = Path(__file__).with_name("laws.csv")
+
+TICK = 10.0
+"""Tick of all flights, s, unless the scenario's is longer: a tenth of the time, and all laws are as good."""
+
+MOST_TICKS = 18_000
+"""Ticks of all deputies together after which a flight is cut off."""
+
+LAWS: dict[str, dict[str, dict[str, Any]]] = {
+    **{name: {"/**/controller": {"algorithm": name}} for name in ALGORITHMS},
+    "lqr, nonlinear feed-forward": {
+        "/**/controller": {"algorithm": "lqr", "lqr.feed_forward": "nonlinear"},
+        "/**/guidance": {"preview_steps": 1, "preview_step": TICK},
+    },
+    "hinf, full information": {"/**/controller": {"algorithm": "hinf", "hinf.form": "full_information"}},
+}
+"""What is changed of a scenario: all algorithms, and some with other parameters."""
+
+
+class Omniscient:
+    """Stands where the navigation does, and gives the truth as the estimate."""
+
+    def __init__(self, plant: Plant, name: str) -> None:
+        """For a deputy of this plant."""
+        self._plant, self._index = plant, plant.parameters.deputies.index(name)
+
+    def on_tick(self, measurement: Measurement) -> Estimate:
+        """The true state at the tick."""
+        deputy = self._plant.truth().deputies[self._index]
+        return Estimate(
+            time=measurement.time,
+            relative_state=deputy.relative_state,
+            covariance=np.zeros((6, 6)),
+            chief_state=measurement.chief_state,
+            mass=measurement.mass,
+            eclipse=measurement.eclipse,
+            sensor=[],
+            innovation=[],
+            innovation_sigma=[],
+            nis=0.0,
+            status=EstimateStatus.TRACKING,
+        )
+
+
+class Clocked:
+    """Stands where a part does, and notes the compute time of each answer."""
+
+    def __init__(self, part: Any) -> None:
+        """Around a part."""
+        self._part = part
+        self.times: list[float] = []
+
+    def on_tick(self, *inputs: Any) -> Any:
+        """The part's answer."""
+        started = thread_time()
+        answer = self._part.on_tick(*inputs)
+        self.times.append(thread_time() - started)
+        return answer
+
+
+@dataclass(frozen=True)
+class Row:
+    """A flight and its figures; of several deputies the largest errors and peak, and the sum of delta-v."""
+
+    scenario: str
+    law: str
+    knows: str
+    final_error: float
+    """Distance from the target at the end, m."""
+    rms_error: float
+    """Root mean square of the same over the last third, m."""
+    delta_v: float
+    """Sum over the axes, mm/s."""
+    peak: float
+    """Largest force commanded on an axis, mN."""
+    saturated: float
+    """Ticks on which the law asked for more than the limit, %."""
+    compute: float
+    """Median compute time of the controller in a tick, us."""
+
+    @property
+    def name(self) -> str:
+        """Which flight it is."""
+        return f"{self.scenario}, {self.law}, on {self.knows}"
+
+    @property
+    def line(self) -> str:
+        """Line of a Markdown table."""
+        figures = [f"{value:.3g}" for value in astuple(self)[3:]]
+        return f"| {self.law} | {self.knows} | " + " | ".join(figures) + " |"
+
+    def moved(self, expected: "Row | None") -> list[Figure]:
+        """Its figures with the tolerances that follow from those that are expected."""
+        before = [float("nan")] * 6 if expected is None else astuple(expected)[3:]
+        figures = []
+        for field, ours, least in zip(fields(self)[3:], astuple(self)[3:], before, strict=True):
+            relative, absolute, unit = TOLERANCES[field.name]
+            margin = relative * least + absolute
+            words = field.name.replace("_", " ")
+            figures.append(
+                Figure(f"{self.name}: {words}", f"{least:.4g}", ours, unit, least - margin, least + margin)
+            )
+        return figures
+
+
+TOLERANCES = {
+    "final_error": (0.02, 0.005, "m"),
+    "rms_error": (0.02, 0.005, "m"),
+    "delta_v": (0.02, 0.05, "mm/s"),
+    "peak": (0.02, 0.01, "mN"),
+    "saturated": (0.02, 0.1, "%"),
+    "compute": (4.0, 0.0, "us"),
+}
+"""Relative and absolute: far above what rounding changes, below what a change of a law does; and what
+machines differ by."""
+
+HEADING = f"""## All laws on all scenarios
+
+As `formation-gnc sil SCENARIO --controller LAW` flies them, but on ticks of {TICK:g} s; on the truth in place
+of estimates, and on estimates. Error of the true position against the target, at the end and RMS over the
+last third; delta-v summed over the axes; largest force on an axis; share of ticks on which the law asked for
+more than the limit; median compute time of the controller. Of several deputies the largest errors and force,
+and the sum of delta-v. Tolerances are about `verification/laws.csv`: 2 % and 5 mm, 0.05 mm/s, 0.01 mN, 0.1 %;
+five times the compute time.
+"""
+
+HEAD = (
+    "| law | knows | final error, m | RMS, m | delta-v, mm/s | peak, mN | limited, % | compute, us |\n"
+    "|---|---|---|---|---|---|---|---|"
+)
+
+
+def flights() -> list[tuple[str, str, str]]:
+    """Scenario, law and what the law knows, of all flights in the order of the table."""
+    scenarios = sorted(path.stem for path in SCENARIOS.glob("*.yaml"))
+    return list(product(scenarios, LAWS, ("truth", "estimate")))
+
+
+def fly(scenario: str, law: str, knows: str) -> Row:
+    """One flight."""
+    tick = max(TICK, load_scenario(scenario).plant.tick)
+    run = Run(load_scenario(scenario, {"/**": {"tick": tick}, **LAWS[law]}))
+    clocks = []
+    for satellite in run.satellites:
+        if knows == "truth":
+            satellite.navigator = Omniscient(run.plant, satellite.name)
+        clocks.append(Clocked(satellite.autopilot))
+        satellite.autopilot = clocks[-1]
+    records: dict[str, list[Any]] = {}
+
+    def sink(topic: str, record: Any) -> None:
+        records.setdefault(topic, []).append(record)
+
+    names = run.plant.parameters.deputies
+    for _ in range(min(run.plant.parameters.ticks, MOST_TICKS // len(names))):
+        run.tick(sink)
+    if run.misses:
+        raise RuntimeError(f"{scenario}, {law}: {run.misses} ticks missed")
+    errors, forces, masses, limited = [], [], [], []
+    for index, name in enumerate(names):
+        aims = np.array([target.relative_state for target in records[f"/{name}/target"]])
+        true = [truth.deputies[index] for truth in records["/truth"]]
+        errors.append(
+            np.linalg.norm((np.array([each.relative_state for each in true]) - aims)[:, :3], axis=1)
+        )
+        forces.append([thrust.force for thrust in records[f"/{name}/thrust"]])
+        masses.append([each.mass for each in true])
+        limited.append([any(status.saturated) for status in records[f"/{name}/status"]])
+    error, force = np.array(errors), np.abs(forces)
+    last = error[:, -(error.shape[1] // 3) :]
+    return Row(
+        scenario,
+        law,
+        knows,
+        float(error[:, -1].max()),
+        float(np.sqrt(np.mean(last**2, axis=1)).max()),
+        1e3 * tick * float((force.sum(axis=2) / masses).sum()),
+        1e3 * float(force.max()),
+        100.0 * float(np.mean(limited)),
+        1e6 * float(np.median(np.concatenate([clock.times for clock in clocks]))),
+    )
+
+
+def expected() -> dict[str, Row]:
+    """What was flown when the figures were last accepted, by name."""
+    with EXPECTED.open() as stream:
+        kept = [
+            Row(row[0], row[1], row[2], *[float(value) for value in row[3:]])
+            for row in list(csv.reader(stream))[1:]
+        ]
+    return {row.name: row for row in kept}
+
+
+def all_laws(_: Path) -> tuple[str, list[Figure]]:
+    """The table as a section of a page, and its figures with their tolerances."""
+    lines, figures, before = [HEADING], [], expected()
+    for scenario, group in groupby(flights(), key=itemgetter(0)):
+        lines += [f"### {scenario}", "", HEAD]
+        for flight in group:
+            row = fly(*flight)
+            lines.append(row.line)
+            figures += row.moved(before.get(row.name))
+        lines.append("")
+    outside = [figure.row for figure in figures if not figure.holds]
+    if outside:
+        lines += ["Moved:", "", TABLE.replace("printed", "expected"), *outside, ""]
+    return "\n".join(lines), figures
+
+
+def main(names: list[str]) -> None:
+    """Accept what flies now; of the named scenarios and laws alone, when there are names."""
+    before = expected() if names else {}
+    flown = [
+        fly(scenario, law, knows)
+        if not names or {scenario, law} & {*names}
+        else before[f"{scenario}, {law}, on {knows}"]
+        for scenario, law, knows in flights()
+    ]
+    with EXPECTED.open("w", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow([field.name for field in fields(Row)])
+        writer.writerows(
+            [value if isinstance(value, str) else f"{value:.6g}" for value in astuple(row)] for row in flown
+        )
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
