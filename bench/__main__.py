@@ -9,10 +9,15 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from bench import control, dynamics, graph
+from bench import control, dynamics, graph, navigation
 from bench.result import Result
 
-BENCHMARKS = {"graph": graph.run, "dynamics": dynamics.run, "control": control.run}
+BENCHMARKS = {
+    "graph": graph.run,
+    "dynamics": dynamics.run,
+    "navigation": navigation.run,
+    "control": control.run,
+}
 OUTPUT = Path("build/bench.json")
 
 

@@ -1,4 +1,4 @@
-"""The navigation filter: consistent, blind where it says so, near the bound, robust, and fast.
+"""The navigation filter: consistent, blind where it says so, near the bound, and robust.
 
 `main` writes `navigation.md` and its plots, and returns the number of figures outside their tolerance.
 """
@@ -7,23 +7,19 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import pairwise
 from math import radians, sqrt
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from filterpy.kalman import ExtendedKalmanFilter
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from formation_gnc.interface import Estimate, EstimateStatus, Measurement, Refusal, Sensor
 from formation_gnc.mission import Orbit
 from formation_gnc.navigation import kernels
-from formation_gnc.navigation.filters import ExtendedFilter
-from formation_gnc.navigation.measurement import NAMES, Readings, Track
+from formation_gnc.navigation.measurement import NAMES
 from formation_gnc.navigation.navigator import NavigationParameters
 from formation_gnc.navigation.observability import orbit_period, predicted_blind_direction
 from formation_gnc.navigation.process import Leg, NonlinearProcess, process_noise, substeps
@@ -561,110 +557,6 @@ def _plot_troubles(path: Path, tick: float, error: Array, sigma: Array, outage: 
     plt.close(figure)
 
 
-class _Bare(ExtendedKalmanFilter):  # type: ignore[misc]
-    """FilterPy's filter as a user writes it down: a nonlinear prediction, and its own covariance."""
-
-    def fly(self, leg: Leg, nothing: Array) -> None:
-        self.moved, _, self.F = kernels.fly(
-            leg.chief, leg.next_chief, self.x, self.P, nothing, leg.acceleration, leg.duration, leg.substeps
-        )
-        self.predict()
-
-    def predict_x(self, u: float = 0) -> None:
-        self.x = self.moved
-
-
-def speed() -> tuple[str, list[Figure]]:
-    """Point 4: the filter's step beside bare FilterPy with the same compiled models; best of many."""
-    parameters = NavigationParameters(chief=LEO, tick=1.0)
-    samples = [each.measurement for each in rehearse(parameters, 600, np.random.default_rng(1))]
-    every_tenth = [
-        each if index % 10 == 0 else replace(each, sensor=[], reading=[], age=[])
-        for index, each in enumerate(samples)
-    ]
-    noise, nothing = process_noise(1e-14, 1.0), np.zeros((6, 6))
-    covariance = np.diag(np.repeat([0.25, 2.5e-7], 3))
-    sensors, variance = np.array([0, 1, 2]), np.array([25.0, 1e-4, 1e-12])
-    process, track = NonlinearProcess(), Track(60)
-    legs = [
-        Leg(one.chief_state, other.chief_state, np.zeros(3), 1.0, 1) for one, other in pairwise(every_tenth)
-    ]
-
-    def bare() -> Array:
-        filter = _Bare(6, 3)
-        filter.x, filter.P, filter.Q, filter.R = samples[0].fix, covariance, noise, np.diag(variance)
-        times = np.empty(len(legs))
-        for index, (leg, measurement) in enumerate(zip(legs, every_tenth[1:], strict=True)):
-            begun = perf_counter()
-            filter.fly(leg, nothing)
-            if measurement.sensor:
-                filter.update(
-                    np.array(measurement.reading),
-                    lambda x, chief=leg.next_chief: kernels.read_relative(sensors, chief, x)[1],
-                    lambda x, chief=leg.next_chief: kernels.read_relative(sensors, chief, x)[0],
-                )
-            times[index] = perf_counter() - begun
-        return times
-
-    def step() -> Array:
-        filter = ExtendedFilter(samples[0].fix, covariance)
-        times = np.empty(len(legs))
-        for index, (leg, measurement) in enumerate(zip(legs, every_tenth[1:], strict=True)):
-            begun = perf_counter()
-            filter.fly(process, leg, noise)
-            if measurement.sensor:
-                filter.weigh(
-                    Readings(
-                        sensors,
-                        np.array(measurement.reading),
-                        nothing[0, :3],
-                        variance,
-                        leg.next_chief,
-                        track,
-                        False,
-                    )
-                )
-                filter.correct(pseudo=False)
-            times[index] = perf_counter() - begun
-        return times
-
-    def whole() -> Array:
-        part = navigator(parameters)
-        part.on_tick(every_tenth[0])
-        times = np.empty(len(legs))
-        for index, measurement in enumerate(every_tenth[1:]):
-            begun = perf_counter()
-            part.on_tick(measurement)
-            times[index] = perf_counter() - begun
-        return times
-
-    best = {each.__name__: np.full(len(legs), np.inf) for each in (bare, step, whole)}
-    for _ in range(25):  # interleaved, so that a busy machine is busy for all
-        for each in (bare, step, whole):
-            best[each.__name__] = np.minimum(best[each.__name__], each())
-    reading = np.array([bool(measurement.sensor) for measurement in every_tenth[1:]])
-    names = {"bare": "bare FilterPy", "step": "the filter's step", "whole": "a whole tick of the navigator"}
-    rows = [
-        f"| {names[key]} | {1e6 * np.median(times[~reading]):.1f} | {1e6 * np.median(times[reading]):.1f} "
-        f"| {1e6 * times.mean():.1f} | {times.mean() / best['bare'].mean():.2f} |"
-        for key, times in best.items()
-    ]
-    ratio = float(best["step"].mean() / best["bare"].mean())
-    text = f"""## Speed
-
-A second's tick, readings every tenth; best of 25 for each tick, on the machine that wrote this page. Bare
-FilterPy flies and reads with the same compiled functions. The filter's step is prediction, the gate's
-variances, update, and the check that the covariance is positive definite; a whole tick adds the checks of
-what comes in, the chief's ephemeris, divergence, observability and the message.
-
-| | prediction only [us] | with readings [us] | mean [us] | over bare FilterPy |
-|---|---|---|---|---|
-{chr(10).join(rows)}
-
-"""
-    return text, [Figure("speed: the filter's step over bare FilterPy", "at most 1.3", ratio, "", 0.0, 1.3)]
-
-
 class _Oracle:
     """In the navigator's place: the truth."""
 
@@ -773,7 +665,6 @@ def main(directory: Path) -> int:
         fourth_sensors,
         partial(troubles, directory),
         partial(closed_loop, directory),
-        speed,
     ):
         text, limits = part()
         sections.append(text)
