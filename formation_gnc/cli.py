@@ -4,6 +4,7 @@ import argparse
 import signal
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from typing import NoReturn
 
 from formation_gnc import __version__
@@ -32,7 +33,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--version", action="version", version=f"formation-gnc {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for name, command in COMMANDS.items():
+    if arguments is None:
+        arguments = sys.argv[1:]
+    # Only what is asked for is imported: a flight need not wait for the libraries of plots and reports.
+    for name in arguments[:1] if set(arguments[:1]) & set(COMMANDS) else COMMANDS:
+        command = import_module(f"formation_gnc.commands.{name}")
         doc = (command.__doc__ or "").strip()
         subparser = commands.add_parser(
             name,

@@ -5,7 +5,9 @@ import json
 import math
 import signal
 import subprocess
+import sys
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -284,12 +286,21 @@ def test_the_help_of_a_command_describes_it_and_all_its_options(
     assert call(name, "--help") == 0
     said = capsys.readouterr().out
     assert said.startswith(f"usage: formation-gnc {name}")
-    assert (COMMANDS[name].__doc__ or "").strip() in said
+    command = import_module(f"formation_gnc.commands.{name}")
+    assert (command.__doc__ or "").strip() in said
     parser = argparse.ArgumentParser()
-    COMMANDS[name].add_arguments(parser)
+    command.add_arguments(parser)
     for action in parser._actions:
         assert action.help, f"{action.dest} has no help"
         assert max(action.option_strings or [action.dest], key=len) in said
+
+
+def test_a_flight_does_not_wait_for_the_libraries_of_plots_and_reports() -> None:
+    asked = (
+        "import sys; from formation_gnc.cli import main; status = main(['sil', 'nowhere']); "
+        "assert not {'matplotlib', 'plotly', 'pandas'} & set(sys.modules); sys.exit(status)"
+    )
+    assert subprocess.run([sys.executable, "-c", asked], check=False).returncode == 2
 
 
 def test_the_version_is_the_packages(capsys: pytest.CaptureFixture[str]) -> None:
