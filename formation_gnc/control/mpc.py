@@ -1,23 +1,25 @@
 """Model predictive control."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import asin, sqrt
 from typing import Any
 
 import numpy as np
 import osqp
+from numpy.typing import NDArray
 from scipy import sparse
 
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
 from formation_gnc.control.linear import LinearController
 from formation_gnc.control.lqr import STRETCHES, LinearQuadraticRegulator, LqrParameters
 from formation_gnc.control.models import DESIGN_MODELS
-from formation_gnc.control.night import Night
 from formation_gnc.control.programme import Programme, facet_normals, facet_reach
 from formation_gnc.control.riccati import Weights, periodic_cost_to_go
 from formation_gnc.control.weights import QuadraticWeights
 from formation_gnc.errors import DesignError
 from formation_gnc.interface import NANOSECONDS, Estimate, Target, Vector
-from formation_gnc.mission import Mission
+from formation_gnc.mission import Mission, Orbit
+from formation_gnc.orbit.constants import EARTH_RADIUS, MU
 from formation_gnc.parameters import parameter
 
 ACCURACY = 1e-4
@@ -94,17 +96,15 @@ class MpcParameters(QuadraticWeights):
         unit="m",
         minimum=0.0,
         in_flight=True,
-        doc="radius of a soft keep-out sphere about the chief; 0 for none",
+        doc="radius of a soft keep-out sphere about each of the other satellites; 0 for none",
     )
-    eclipse: str = parameter(
-        "none",
-        choices=("none", "share", "observed"),
+    keep_out_chief: bool = parameter(
+        True, in_flight=True, doc="whether the chief is a satellite too, with such a sphere"
+    )
+    off_in_eclipse: bool = parameter(
+        False,
         in_flight=True,
-        doc="when the plan has no thrust: never; in the last eclipse_share of every orbit from the start of "
-        "the run (Kremmydas); where the shadow was met on the orbit before",
-    )
-    eclipse_share: float = parameter(
-        1.0 / 3.0, above=0.0, maximum=0.9, in_flight=True, doc="share of an orbit without thrust"
+        doc="no thrust in the eclipses that the target foresees, nor in a step of the plan that meets one",
     )
 
 
@@ -154,13 +154,11 @@ class ModelPredictiveController(Controller):
         if parameters.total_thrust > 0.0:
             self._limit = np.minimum(self._limit, parameters.total_thrust)
         self._unit = float(self._limit.max())
-        self._night = Night(
-            parameters.eclipse, parameters.eclipse_share, self._model.period, mission.chief.semi_major_axis
-        )
-        if self._night.longest >= self._steps * parameters.step:
+        eclipse = longest_eclipse(mission.chief)
+        if parameters.off_in_eclipse and eclipse >= self._steps * parameters.step:
             raise DesignError(
                 f"mpc: the horizon with thrust, {self._steps * parameters.step:.0f} s, is not longer "
-                f"than the eclipse, {self._night.longest:.0f} s"
+                f"than the eclipse, {eclipse:.0f} s"
             )
         gain = "discrete" if self._model.is_time_invariant else "periodic"
         try:
@@ -296,16 +294,12 @@ class ModelPredictiveController(Controller):
         return np.concatenate([programme.hessian, self._hessian_rest])
 
     def take_over(self, handover: Handover) -> None:
-        """Start from the force that flew before; an MPC that flew before hands on what it saw of the
-        shadow."""
+        """Start from the force that flew before."""
         self._force = handover.force
-        if isinstance(handover.law, ModelPredictiveController):
-            self._night.seen = handover.law._night.seen
 
     def command(self, estimate: Estimate, target: Target) -> Command:
         """The plan's force for this tick: from a new plan when one is due, else from the plan in force."""
-        time = estimate.time
-        self._night.watch(time, estimate.eclipse)
+        time, share = estimate.time, estimate.mass / self._mass
         due = not len(self._plan) or time - self._planned_at >= max(
             round(self._parameters.replan_interval * NANOSECONDS), 1
         )
@@ -313,16 +307,34 @@ class ModelPredictiveController(Controller):
         if command is None:
             command = self._follow(time, f"mpc: {self._answer}; the last plan flies")
         if command is None:
-            reserve = self.reserve.command(estimate, target).force
+            reserve = self.reserve.command(estimate, target).force / share
             command = Command(reserve, fallback=f"mpc: {self._answer}; no plan, LQR flies")
-        self._force = np.clip(command.force, -self._limit, self._limit)
-        return Command(
-            command.force * estimate.mass / self._mass,
-            command.solver,
-            command.iterations,
-            command.cost,
-            command.fallback,
+        force = self._held(command.force, estimate.time, target)
+        self._force = np.clip(force, -self._limit, self._limit)
+        return replace(command, force=force * share)
+
+    def _held(self, force: Vector, time: int, target: Target) -> Vector:
+        """A force within what holds besides the limit per axis: the solver keeps to it but for its accuracy,
+        and neither an older plan nor LQR knows what is so now."""
+        parameters = self._parameters
+        if parameters.off_in_eclipse and self._dark(time, self._tick_ns, 1, target).any():
+            return np.zeros(3)
+        if parameters.thrust_rate > 0.0:
+            change = parameters.thrust_rate * self._tick_ns / NANOSECONDS
+            force = np.clip(force, self._force - change, self._force + change)
+        if parameters.total_thrust > 0.0:
+            force = force * min(1.0, parameters.total_thrust / max(float(np.linalg.norm(force)), 1e-300))
+        return force
+
+    @staticmethod
+    def _dark(time: int, step: int, steps: int, target: Target) -> NDArray[np.bool_]:
+        """(steps,) whether any part of each step (ns) from a time (ns) is in a foreseen eclipse."""
+        begin = (time + step * np.arange(steps)[:, None]) / NANOSECONDS
+        end = begin + step / NANOSECONDS
+        dark: NDArray[np.bool_] = np.any(
+            (begin < target.eclipse[:, 1]) & (end > target.eclipse[:, 0]), axis=1
         )
+        return dark
 
     def _follow(self, time: int, reason: str) -> Command | None:
         """The step of the plan in force for this time: none when there is no plan or it has ended early."""
@@ -342,10 +354,10 @@ class ModelPredictiveController(Controller):
         gradient[:count], cost_of_free = self._error_of_free_motion(programme, estimate, target)
         if parameters.cost == "absolute":
             gradient[count : 2 * count] = programme.price
-        lower, upper = self._bounds(estimate.time)
+        lower, upper = self._bounds(estimate.time, target)
         rows = {}
         if parameters.keep_out_radius > 0.0:
-            rows = {"Ax": self._keep_out(programme, estimate, lower)}
+            rows = {"Ax": self._keep_out(programme, estimate, target, lower)}
         self._solver.update(q=gradient, l=lower, u=upper, **rows)
         result = self._solver.solve(raise_error=False)
         self._answer = result.info.status
@@ -359,13 +371,6 @@ class ModelPredictiveController(Controller):
             self._answer = f"{result.info.status}, but outside the limits"
             return None
         self._plan = (self._unit * force).reshape(-1, 3)
-        # What the solver's accuracy leaves beyond the limits of the force that flies next is cut off.
-        if parameters.thrust_rate > 0.0:
-            change = parameters.thrust_rate * self._tick_ns / NANOSECONDS
-            self._plan[0] = np.clip(self._plan[0], self._force - change, self._force + change)
-        if parameters.total_thrust > 0.0:
-            size = np.linalg.norm(self._plan, axis=1, keepdims=True)
-            self._plan *= np.minimum(1.0, parameters.total_thrust / np.maximum(size, 1e-300))
         self._planned_at = estimate.time
         cost = 2.0 * result.info.obj_val / programme.scale + cost_of_free
         return Command(self._plan[0], result.info.status, int(result.info.iter), float(cost))
@@ -398,16 +403,15 @@ class ModelPredictiveController(Controller):
         weighted = (programme.weight @ error[:, :, None])[:, :, 0]
         return programme.gradient @ error.ravel(), float(np.sum(error * weighted))
 
-    def _bounds(self, time: int) -> tuple[Vector, Vector]:
+    def _bounds(self, time: int, target: Target) -> tuple[Vector, Vector]:
         """Bounds of all rows; those that no time and no force change are made once."""
         parameters, steps = self._parameters, self._steps
-        constant = (
-            parameters.eclipse == "none" and not parameters.thrust_rate and not parameters.keep_out_radius
-        )
+        constant = not (parameters.off_in_eclipse or parameters.thrust_rate or parameters.keep_out_radius)
         if constant and self._constant_bounds is not None:
             return self._constant_bounds
         box = np.tile(self._limit / self._unit, steps)
-        box[np.repeat(self._night.dark(time, self._step_ns, steps), 3)] = 0.0
+        if parameters.off_in_eclipse:
+            box[np.repeat(self._dark(time, self._step_ns, steps, target), 3)] = 0.0
         facet = np.full(10 * steps, parameters.total_thrust / self._unit / facet_reach())
         if parameters.total_thrust > 0.0:
             box = np.minimum(box, facet[0])
@@ -435,22 +439,36 @@ class ModelPredictiveController(Controller):
         self._constant_bounds = bounds if constant else None
         return bounds
 
-    def _keep_out(self, programme: Programme, estimate: Estimate, lower: Vector) -> Vector:
-        """Keep to the outside of a plane per step, which touches the sphere where the last plan comes
-        closest.
+    def _keep_out(self, programme: Programme, estimate: Estimate, target: Target, lower: Vector) -> Vector:
+        """Keep to the outside of a plane per step: that which touches the sphere of the satellite that is
+        nearest then, where the last plan comes closest to it. The others fly freely.
 
         Sets the last rows of `lower`, and returns the elements of all rows.
         """
         parameters, horizon = self._parameters, self._parameters.horizon
+        data: Vector = self._rows.data.copy()
+        others = np.vstack([target.others, np.zeros((int(parameters.keep_out_chief), 6))])
+        if not len(others):
+            data[self._keep_out_entries], lower[-horizon:] = 0.0, -np.inf
+            return data
         unit = np.array(parameters.position_error).min()
-        free = (programme.free @ estimate.relative_state).reshape(horizon, 6)[:, :3]
+        # How the satellite would come past each of the others without thrust, and how with the last plan.
+        free = (programme.free @ (estimate.relative_state - others).T).reshape(horizon, 6, -1)[:, :3]
         forced = programme.forced.reshape(horizon, 6, -1)[:, :3]
         planned = np.zeros((self._steps, 3))
         planned[: len(self._plan)] = self._plan / self._unit
-        path = free + forced @ planned.ravel()
-        distance = np.linalg.norm(path, axis=1, keepdims=True)
-        normal = np.where(distance > 1e-9, path / np.maximum(distance, 1e-9), [0.0, 1.0, 0.0])
-        data: Vector = self._rows.data.copy()
+        past = free + (forced @ planned.ravel())[:, :, None]
+        distance = np.linalg.norm(past, axis=1)
+        nearest = np.arange(horizon), slice(None), distance.argmin(axis=1)
+        distance = distance.min(axis=1)[:, None]
+        normal = np.where(distance > 1e-9, past[nearest] / np.maximum(distance, 1e-9), [0.0, 1.0, 0.0])
         data[self._keep_out_entries] = (np.einsum("ki,kij->kj", normal, forced) / unit)[self._keep_out_index]
-        lower[-horizon:] = (parameters.keep_out_radius - np.einsum("ki,ki->k", normal, free)) / unit
+        lower[-horizon:] = (parameters.keep_out_radius - np.einsum("ki,ki->k", normal, free[nearest])) / unit
         return data
+
+
+def longest_eclipse(chief: Orbit) -> float:
+    """Time (s) across the Earth's shadow where the chief is slowest: no eclipse is longer."""
+    apogee = chief.semi_major_axis * (1.0 + chief.eccentricity)
+    speed = sqrt(MU / chief.semi_major_axis * (1.0 - chief.eccentricity) / (1.0 + chief.eccentricity))
+    return 2.0 * asin(min(1.0, EARTH_RADIUS / apogee)) * apogee / speed

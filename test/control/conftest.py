@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from formation_gnc.control.controller import Vehicle
-from formation_gnc.interface import NANOSECONDS, Estimate, Target, Vector
+from formation_gnc.interface import NANOSECONDS, NO_ECLIPSE, NOBODY, Estimate, Matrix, Target, Vector
 from formation_gnc.mission import Mission, Orbit
 
 
@@ -44,10 +44,15 @@ def estimate() -> Callable[..., Estimate]:
 
 @pytest.fixture(scope="session")
 def target() -> Callable[..., Target]:
-    """A target state at a time (s), with or without a preview."""
+    """A target state at a time (s), with or without a preview, eclipses (s) and other satellites."""
 
     def build(
-        state: Vector | None = None, time: float = 0.0, preview: Vector | None = None, step: float = 60.0
+        state: Vector | None = None,
+        time: float = 0.0,
+        preview: Vector | None = None,
+        step: float = 60.0,
+        eclipse: Matrix = NO_ECLIPSE,
+        others: Matrix = NOBODY,
     ) -> Target:
         return Target(
             round(time * NANOSECONDS),
@@ -55,6 +60,8 @@ def target() -> Callable[..., Target]:
             np.zeros(6) if state is None else np.asarray(state, dtype=float),
             step,
             np.empty((0, 6)) if preview is None else preview,
+            eclipse,
+            others,
         )
 
     return build

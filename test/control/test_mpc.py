@@ -8,9 +8,10 @@ from scipy.optimize import lsq_linear
 
 from formation_gnc.control.autopilot import Autopilot, ControllerParameters
 from formation_gnc.control.controller import Handover, Vehicle
-from formation_gnc.control.mpc import ModelPredictiveController, MpcParameters
+from formation_gnc.control.mpc import ModelPredictiveController, MpcParameters, longest_eclipse
 from formation_gnc.control.programme import facet_normals, facet_reach
 from formation_gnc.errors import DesignError
+from formation_gnc.interface import NO_ECLIPSE, NOBODY
 from formation_gnc.mission import Mission, Orbit
 from formation_gnc.parameters import load
 from formation_gnc.relative.chief import KeplerChief
@@ -25,13 +26,11 @@ def make(mission, vehicle, **changes):
     return ModelPredictiveController(dataclasses.replace(ROBERTS, **changes), mission, vehicle)
 
 
-def fly(law, model, estimate, target, start, ticks, tick=10.0, mass=100.0, dark=None):
+def fly(law, model, estimate, target, start, ticks, tick=10.0, mass=100.0, eclipse=NO_ECLIPSE):
     states, commands = [np.asarray(start, dtype=float)], []
     for index in range(ticks):
         time = index * tick
-        seen = estimate(states[-1], time, mass)
-        seen.eclipse = bool(dark and dark(time))
-        commands.append(law.command(seen, target(time=time)))
+        commands.append(law.command(estimate(states[-1], time, mass), target(time=time, eclipse=eclipse)))
         phi, gamma = model.discretise(time, tick)
         states.append(phi @ states[-1] + gamma @ (commands[-1].force / mass))
     return np.array(states), np.array([command.force for command in commands]), commands
@@ -125,38 +124,45 @@ def test_total_thrust_and_its_rate_are_kept(mission, vehicle, estimate, target):
     assert np.linalg.norm(states[-1, :3]) < 0.5
 
 
-def test_no_thrust_in_kremmydas_eclipse(mission, vehicle, estimate, target):
-    law = make(mission, vehicle, eclipse="share", horizon=50)
-    states, forces, _ = fly(
-        law, HillModel(mission.mean_motion), estimate, target, [60, 60, 60, 0, 0, 0], 1700
-    )
+@pytest.mark.parametrize("replan_interval", [0.0, 1200.0])
+def test_no_thrust_in_the_eclipses_that_are_foreseen(replan_interval, mission, vehicle, estimate, target):
+    # As Kremmydas has them: the last third of every orbit.
+    law = make(mission, vehicle, off_in_eclipse=True, horizon=50, replan_interval=replan_interval)
     period = 2.0 * np.pi / mission.mean_motion
-    begins, ends = 10.0 * np.arange(1700), 10.0 * np.arange(1, 1701)
-    dark = (begins % period >= 2.0 / 3.0 * period) | (ends // period > begins // period)
+    windows = period * (np.arange(4)[:, None] + np.array([2.0 / 3.0, 1.0]))
+    states, forces, _ = fly(
+        law,
+        HillModel(mission.mean_motion),
+        estimate,
+        target,
+        [60, 60, 60, 0, 0, 0],
+        1700,
+        eclipse=windows,
+    )
+    begins = 10.0 * np.arange(1700)[:, None]
+    dark = ((begins < windows[:, 1]) & (begins + 10.0 > windows[:, 0])).any(axis=1)
+    assert 500 < dark.sum() < 600
     assert not forces[dark].any()
     assert np.abs(forces[~dark]).max() > 0.009
-    assert np.linalg.norm(states[-1, :3]) < 0.2
+    assert np.linalg.norm(states[-1, :3]) < 0.5
 
 
-def test_the_shadow_that_was_met_is_expected_an_orbit_later(mission, vehicle, estimate, target):
-    period = 2.0 * np.pi / mission.mean_motion
-    law = make(mission, vehicle, eclipse="observed", horizon=50)
+def test_an_eclipse_is_met_as_soon_as_it_is_foreseen_and_ends_on_its_tick(mission, vehicle, estimate, target):
+    # Whatever plan flies, and LQR in its place: a plan of ten minutes made before the eclipse was known.
+    law = make(mission, vehicle, off_in_eclipse=True, horizon=50, replan_interval=3000.0)
+    window, forces = np.array([[300.0, 600.0]]), []
+    for tick in range(80):
+        known = window if tick >= 20 else NO_ECLIPSE
+        seen = estimate([60, 60, 60, 0, 0, 0], 10.0 * tick)
+        forces.append(law.command(seen, target(time=10.0 * tick, eclipse=known)).force)
+    assert [bool(force.any()) for force in forces] == [True] * 30 + [False] * 30 + [True] * 20
 
-    def dark(time):
-        return 0.2 * period <= time % period < 0.5 * period
 
-    _, forces, _ = fly(
-        law, HillModel(mission.mean_motion), estimate, target, [200, 60, 60, 0, 0, 0], 1100, dark=dark
-    )
-    times = 10.0 * np.arange(1100)
-    inside = np.array([dark(time + 10.0) or dark(time) for time in times])
-    second = (times > period) & inside
-    # One tick late at its end: the flag was first seen off at the tick after.
-    assert np.abs(forces[second]).max() < 1e-12
-    assert np.abs(forces[(times > period) & ~inside]).max() > 1e-4
-    heir = make(mission, vehicle, eclipse="observed", horizon=50)
-    heir.take_over(Handover(forces[-1], "mpc", law))
-    assert heir._night.seen == law._night.seen
+def test_longest_eclipse_is_that_of_the_shadow_and_known_orbits():
+    # 69.4 min is what the Earth's full shadow takes of a geostationary orbit.
+    assert longest_eclipse(Orbit(42164e3)) / 60.0 == pytest.approx(69.4, abs=0.2)
+    assert longest_eclipse(Orbit(7078e3)) / 60.0 == pytest.approx(35.3, abs=0.3)
+    assert longest_eclipse(Orbit(1e7, eccentricity=0.3)) > longest_eclipse(Orbit(1e7))
 
 
 def test_one_solve_serves_the_replan_interval(mission, vehicle, estimate, target):
@@ -224,21 +230,49 @@ def test_absolute_cost_takes_less_delta_v(mission, vehicle, estimate, target):
     assert used["absolute"] < 0.9 * used["quadratic"]
 
 
-def test_the_keep_out_sphere_is_flown_round(mission, vehicle, estimate, target):
+def past(law, mission, estimate, target, others=NOBODY):
+    """Flight from 60 m ahead of the chief to 60 m behind, with others in free flight: states of all."""
+    model, aim = HillModel(mission.mean_motion), np.array([0.0, -60.0, 0.0, 0.0, 0.0, 0.0])
+    state, states, theirs = np.array([0.0, 60.0, 1.0, 0.0, 0.0, 0.0]), [], []
+    for index in range(600):
+        time = 10.0 * index
+        command = law.command(estimate(state, time), target(aim, time, others=others))
+        assert not command.fallback
+        states.append(state)
+        theirs.append(others)
+        state = model.propagate(0.0, state, 10.0, command.force / 100.0)
+        others = model.propagate(0.0, others, 10.0)
+    assert np.linalg.norm(state[:3] - aim[:3]) < 3.0
+    return np.array(states), np.array(theirs)
+
+
+def test_the_keep_out_sphere_about_the_chief_is_flown_round(mission, vehicle, estimate, target):
     closest = {}
-    for radius in (0.0, 40.0):
-        law = make(mission, vehicle, keep_out_radius=radius)
-        start, aim = [0.0, 60.0, 1.0, 0.0, 0.0, 0.0], np.array([0.0, -60.0, 0.0, 0.0, 0.0, 0.0])
-        states = [np.array(start)]
-        for index in range(600):
-            command = law.command(estimate(states[-1], 10.0 * index), target(aim, 10.0 * index))
-            states.append(
-                HillModel(mission.mean_motion).propagate(0.0, states[-1], 10.0, command.force / 100.0)
-            )
-        closest[radius] = np.linalg.norm(np.array(states)[:, :3], axis=1).min()
-        assert np.linalg.norm(states[-1][:3] - aim[:3]) < 3.0
-    assert closest[0.0] < 30.0
-    assert closest[40.0] > 38.0  # it is soft
+    for radius, chief in ((0.0, True), (40.0, False), (40.0, True)):
+        law = make(mission, vehicle, keep_out_radius=radius, keep_out_chief=chief)
+        states, _ = past(law, mission, estimate, target)
+        closest[radius, chief] = np.linalg.norm(states[:, :3], axis=1).min()
+    assert closest[0.0, True] < 30.0
+    assert closest[40.0, False] < 30.0
+    assert closest[40.0, True] > 38.0  # it is soft
+
+
+def test_keep_out_spheres_about_others_are_flown_round_as_these_move(mission, vehicle, estimate, target):
+    # Two that come to where the satellite would be, at different times, on closed orbits.
+    model, n = HillModel(mission.mean_motion), mission.mean_motion
+    alone, _ = past(make(mission, vehicle), mission, estimate, target)
+    others = []
+    for tick, rate in ((110, 0.02), (180, -0.02)):
+        x, y, z = alone[tick, :3] + [2.0, 1.0, -1.0]
+        others.append(model.propagate(0.0, np.array([x, y, z, 0.0, -2.0 * n * x, rate]), -10.0 * tick))
+    closest = {}
+    for radius in (0.0, 20.0):
+        law = make(mission, vehicle, keep_out_radius=radius, keep_out_chief=False)
+        states, theirs = past(law, mission, estimate, target, np.array(others))
+        apart = np.linalg.norm(states[:, None, :3] - theirs[:, :, :3], axis=2)
+        closest[radius] = apart.min(axis=0)
+    assert (closest[0.0] < 3.0).all()
+    assert (closest[20.0] > 18.5).all()  # it is soft
 
 
 def test_a_preview_is_followed_as_far_as_it_reaches(mission, vehicle, estimate, target):
@@ -251,14 +285,14 @@ def test_a_preview_is_followed_as_far_as_it_reaches(mission, vehicle, estimate, 
 
 
 def test_what_cannot_be_solved_flies_the_last_plan_and_then_lqr(mission, vehicle, estimate, target):
-    law = make(mission, vehicle, eclipse="share", thrust_rate=1e-6, horizon=50)
+    law = make(mission, vehicle, off_in_eclipse=True, thrust_rate=1e-6, horizon=50)
     law.take_over(Handover(np.full(3, 0.01), "coast"))
-    first = law.command(estimate(OFFSET, 3500.0), target(time=3500.0))
-    assert first.fallback.startswith(
-        "mpc: primal infeasible"
-    )  # 350 s are too short to bring 10 mN down to none
+    first = law.command(estimate(OFFSET), target(eclipse=np.array([[350.0, 2000.0]])))
+    # 350 s are too short to bring 10 mN down to none at a micronewton per second
+    assert first.fallback.startswith("mpc: primal infeasible")
     assert first.fallback.endswith("no plan, LQR flies")
-    np.testing.assert_allclose(first.force, law.reserve.command(estimate(OFFSET), target()).force)
+    # and LQR keeps to that rate as well
+    np.testing.assert_allclose(first.force, np.full(3, 0.01) - 1e-5)
     good = make(mission, vehicle)
     planned = good.command(estimate(OFFSET), target())
     lost = good.command(estimate(1e200 * np.ones(6), 10.0), target(time=10.0))
@@ -298,8 +332,7 @@ def test_equal_inputs_give_equal_bits(mission, vehicle, estimate, target):
     [
         ({"step": 15.0}, "step is 15.0 s; it must be a whole number of ticks of 10.0 s"),
         ({"control_horizon": 31}, "control_horizon is 31 steps; it must be at most horizon, 30"),
-        ({"eclipse": "share"}, "is not longer than the eclipse"),
-        ({"eclipse": "observed"}, "is not longer than the eclipse"),
+        ({"off_in_eclipse": True}, "the horizon with thrust, 1800 s, is not longer than the eclipse, 21"),
         (
             {"state_weight": tuple(-np.eye(6).ravel())},
             "mpc, in reserve lqr: the state weight has a normalised",
