@@ -134,6 +134,19 @@ class Status:
 
 
 @dataclass(slots=True)
+class Separation:
+    """How near a deputy will come to the others of its fleet, as far as it can tell."""
+
+    time: int
+    planned: float
+    planned_time: float
+    planned_other: str
+    passive: float
+    passive_time: float
+    passive_other: str
+
+
+@dataclass(slots=True)
 class SatelliteTruth:
     """True state of one deputy."""
 

@@ -9,6 +9,7 @@ import dataclasses
 import json
 import sys
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -40,8 +41,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         help="simulated seconds per wall second at most; 0: no limit",
     )
-    parser.add_argument(
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
         "--in-process", action="store_true", help="fly in this process, without the node graph"
+    )
+    where.add_argument(
+        "--composed", action="store_true", help="one process for each satellite, not for each of its nodes"
     )
     parser.add_argument(
         "--bag", metavar="DIR", type=Path, help="directory to make for the bag (default: bags/SCENARIO_DATE)"
@@ -56,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
     if bag.exists():
         raise ConfigurationError(f"bag {bag}: exists already; name a directory that does not")
     console = Console(stderr=True, highlight=False)
-    fly = _fly_in_process if options.in_process else _fly_on_graph
+    fly = _fly_in_process if options.in_process else partial(_fly_on_graph, composed=options.composed)
     try:
         speedup = fly(scenario, bag, console)
     except KeyboardInterrupt:
@@ -133,7 +138,7 @@ class _Display:
             self.say(message)
 
 
-def _fly_on_graph(scenario: Scenario, bag: Path, console: Console) -> float:
+def _fly_on_graph(scenario: Scenario, bag: Path, console: Console, composed: bool) -> float:
     from formation_gnc.nodes.launcher import Report, fly_graph
 
     Run(scenario)  # what cannot be flown is refused before anything starts
@@ -142,7 +147,8 @@ def _fly_on_graph(scenario: Scenario, bag: Path, console: Console) -> float:
         display.show(report.message, report.figures.get("tick", 0.0), report.figures.get("speedup", 0.0))
 
     with _Display(console, scenario.plant.ticks) as display:
-        return fly_graph(scenario, bag.absolute(), show, display.say).figures.get("speedup", 0.0)
+        last = fly_graph(scenario, bag.absolute(), show, display.say, composed)
+        return last.figures.get("speedup", 0.0)
 
 
 def _fly_in_process(scenario: Scenario, bag: Path, console: Console) -> float:

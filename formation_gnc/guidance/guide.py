@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, make_dataclass
+from dataclasses import dataclass, make_dataclass, replace
 from functools import lru_cache
 from itertools import combinations
 from typing import Any
@@ -10,10 +10,21 @@ from typing import Any
 import numpy as np
 
 from formation_gnc.errors import ConfigurationError
+from formation_gnc.guidance.fleet import places_for, share_out
+from formation_gnc.guidance.prediction import in_words, predict
 from formation_gnc.guidance.registry import FORMATIONS
 from formation_gnc.guidance.targets import TARGET_MODELS, TargetPath
 from formation_gnc.guidance.transfer import LONGEST, shortest_time
-from formation_gnc.interface import NANOSECONDS, NO_ECLIPSE, Estimate, Matrix, Target, Vector
+from formation_gnc.interface import (
+    NANOSECONDS,
+    NO_ECLIPSE,
+    NOBODY,
+    Estimate,
+    Matrix,
+    Separation,
+    Target,
+    Vector,
+)
 from formation_gnc.mission import LAST_SECOND
 from formation_gnc.orbit.eclipse import eclipses
 from formation_gnc.orbit.propagation import ImpactError
@@ -25,6 +36,9 @@ LARGEST_ERROR = 0.05
 
 ECLIPSE_STEPS = 180
 """Points of a revolution at which the chief is looked at for eclipses."""
+
+NEVER = -LAST_SECOND * NANOSECONDS
+"""Time (ns) long before every run."""
 
 OUT_OF_REACH = 1e9
 """Distance (m) from the chief that is no formation any more."""
@@ -54,6 +68,42 @@ class GuideParameters(Schedulable):
         in_flight=True,
         doc="time to reach a changed target: less than the thrusters need is told, and no other change is "
         "taken meanwhile; 0 for no hurry",
+    )
+    fleet: tuple[str, ...] = parameter(
+        (),
+        doc="names of all satellites of the formation, the deputy's too: their estimates are waited for; "
+        "none: it flies by itself",
+    )
+    assignment: str = parameter(
+        "fixed",
+        choices=("fixed", "delta_v", "fuel"),
+        doc="who takes which place: fixed by slot and phase; delta_v shares them out over the fleet, phase "
+        "included, for the least sum, at the start and at every change; with fuel, a delta-v counts in "
+        "inverse proportion to what the tank holds",
+    )
+    dry_masses: tuple[float, ...] = parameter(
+        (), unit="kg", minimum=0.0, doc="mass of each of the fleet with an empty tank, for assignment by fuel"
+    )
+    separation_warning: float = parameter(
+        0.0,
+        unit="m",
+        minimum=0.0,
+        in_flight=True,
+        doc="predicted distance to another of the fleet below which an event warns; 0 for none",
+    )
+    separation_interval: float = parameter(
+        60.0,
+        unit="s",
+        above=0.0,
+        in_flight=True,
+        doc="time between predictions of the distances in the fleet",
+    )
+    separation_horizon: float = parameter(
+        2.0,
+        above=0.0,
+        maximum=100.0,
+        in_flight=True,
+        doc="revolutions for which distances are predicted if no thruster fires",
     )
     thrust_limit: tuple[float, ...] = parameter(
         (0.01, 0.01, 0.01),
@@ -87,15 +137,31 @@ class Guide(Part[Any, TargetPath]):
     and how soon the thrusters can be there.
     """
 
+    def __init__(self, name: str, parameters: Any) -> None:
+        """Design the path; raises ConfigurationError when there is none, or a fleet without the deputy."""
+        self._deputy = name.rpartition("/")[0].strip("/")
+        if parameters.fleet and self._deputy not in parameters.fleet:
+            raise ConfigurationError(
+                f"parameter fleet: {list(parameters.fleet)} is not allowed; {self._deputy} must be one of it"
+            )
+        if len(set(parameters.fleet)) != len(parameters.fleet):
+            raise ConfigurationError(
+                f"parameter fleet: {list(parameters.fleet)} is not allowed; no name may come twice"
+            )
+        self.others = tuple(each for each in parameters.fleet if each != self._deputy)
+        super().__init__(name, parameters)
+
     def _start(self) -> None:
         super()._start()
+        self._unassigned = self.parameters.assignment != "fixed"
         self._untold = True
         self._left: str | None = None
         self._until = 0
 
     def forget(self) -> None:
-        """No eclipse has been looked for yet."""
-        self._eclipse, self._eclipse_looked_for = NO_ECLIPSE, -LAST_SECOND * NANOSECONDS
+        """Nothing has been looked for yet, eclipses or others that come near."""
+        self._eclipse, self._eclipse_looked_for = NO_ECLIPSE, NEVER
+        self._predicted, self._warned = NEVER, False
 
     def design(self, parameters: Any) -> TargetPath:
         """The path of the named formation's place, with its own parameters, in the named model."""
@@ -106,6 +172,8 @@ class Guide(Part[Any, TargetPath]):
                 f"parameter slot: {parameters.slot} is not allowed; it must be below {places}, "
                 f"the places of {parameters.formation}"
             )
+        if parameters.assignment != "fixed":
+            _check_assignment(parameters)
         orbit = np.linspace(0.0, math.tau / parameters.mean_motion, 8)
         with np.errstate(all="ignore"):
             formation = kind(own, parameters.mean_motion, parameters.slot)
@@ -126,6 +194,13 @@ class Guide(Part[Any, TargetPath]):
         """As :meth:`Part.prepare`; refuses while a change that was given a time is under way."""
         if self._time < self._until:
             raise ConfigurationError(self._under_way())
+        if self.parameters.assignment != "fixed" and not all(
+            name.startswith("separation_") for name in changes
+        ):
+            raise ConfigurationError(
+                f"assignment is {self.parameters.assignment}: the whole fleet changes at one tick, and so by "
+                "schedule only; the target stays"
+            )
         return super().prepare(changes)
 
     def _let_take_over(self, time: int, due: Configuration[Any, TargetPath]) -> bool:
@@ -142,12 +217,27 @@ class Guide(Part[Any, TargetPath]):
         now = np.array([self._time / NANOSECONDS])
         if np.array_equal(old.design.states(now), new.design.states(now)):
             return
+        self._unassigned = new.parameters.assignment != "fixed"
         self._untold, self._left = True, old.parameters.formation
         self._until = self._time + round(new.parameters.reconfiguration_time * NANOSECONDS)
 
-    def on_tick(self, estimate: Estimate) -> Target:
-        """The target at the estimate's stamp and its preview."""
+    def on_tick(self, estimate: Estimate, *others: Estimate | None) -> tuple[Target, Separation | None]:
+        """The target at the estimate's stamp, and how near the others will come when that is due.
+
+        Args:
+            estimate: of this deputy.
+            others: of the others of its fleet, in the fleet's order, at the same stamp; None for one that is
+                silent.
+        """
         self.begin_tick(estimate.time)
+        known = {
+            name: each
+            for name, each in zip(self.others, others, strict=True)
+            if each is not None and np.isfinite(each.relative_state).all()
+        }
+        if self._unassigned:
+            self._unassigned = False
+            self._take_place(estimate, known)
         times = estimate.time / NANOSECONDS + _ahead(
             self.parameters.preview_step, self.parameters.preview_steps
         )
@@ -157,14 +247,58 @@ class Guide(Part[Any, TargetPath]):
             self._tell_of_the_model(estimate.time)
             if self._left is not None:
                 self._tell_of_the_change(estimate, states[0])
-        return Target(
+        target = Target(
             estimate.time,
             self.parameters.formation,
             states[0],
             self.parameters.preview_step,
             states[1:],
             self._coming_eclipse(estimate),
+            np.array([each.relative_state for each in known.values()]) if known else NOBODY,
         )
+        return target, self._predict(estimate, target, list(known))
+
+    def _take_place(self, estimate: Estimate, known: Mapping[str, Estimate]) -> None:
+        """Take this deputy's place of those that are shared out over the fleet."""
+        parameters, fleet = self.parameters, {**known, self._deputy: estimate}
+        silent = [name for name in parameters.fleet if name not in fleet]
+        if silent or not np.isfinite(estimate.relative_state).all():
+            who = ", ".join(silent) or self._deputy
+            self.record(estimate.time, "warning", f"no state of {who}: places stay as they are")
+            return
+        states = np.array([fleet[name].relative_state for name in parameters.fleet])
+        masses = np.array([fleet[name].mass for name in parameters.fleet])
+        shared = share_out(parameters, estimate.time / NANOSECONDS, states, masses)
+        index = parameters.fleet.index(self._deputy)
+        place = {"slot": shared.slots[index], "phase": shared.phase}
+        self.configuration = self._design_from(parameters, place)
+        self.record(
+            estimate.time,
+            "assignment",
+            f"{parameters.formation}: place {shared.slots[index]}, phase {shared.phase:.4f} rad, "
+            f"{shared.delta_v[index]:.3g} m/s of the fleet's {sum(shared.delta_v):.3g} m/s",
+        )
+
+    def _predict(self, estimate: Estimate, target: Target, names: list[str]) -> Separation | None:
+        """How near the others will come, now and then; warns when that is too near."""
+        parameters = self.parameters
+        due = estimate.time - self._predicted >= parameters.separation_interval * NANOSECONDS
+        if not (names and due and np.isfinite(estimate.relative_state).all()):
+            return None
+        self._predicted = estimate.time
+        separation = predict(
+            self.configuration.design,
+            target,
+            estimate.relative_state,
+            names,
+            parameters.separation_horizon,
+            parameters.mean_motion,
+        )
+        warns = min(separation.planned, separation.passive) < parameters.separation_warning
+        if warns != self._warned:
+            self._warned = warns
+            self.record(estimate.time, "separation", in_words(separation) if warns else "over")
+        return separation
 
     def _coming_eclipse(self, estimate: Estimate) -> Matrix:
         """Eclipses of the chief, looked for two revolutions ahead in every revolution."""
@@ -225,15 +359,47 @@ def _ahead(step: float, steps: int) -> Vector:
     return ahead
 
 
+def _check_assignment(parameters: Any) -> None:
+    """Refuse an assignment that no fleet could fly."""
+    count, places = len(parameters.fleet), places_for(parameters)
+    if not count:
+        raise ConfigurationError(
+            f"parameter assignment: {parameters.assignment} is not allowed without a fleet; name it"
+        )
+    if places < count:
+        raise ConfigurationError(
+            f"formation {parameters.formation}: {places} places for a fleet of {count}; each must have one"
+        )
+    if parameters.assignment == "fuel" and len(parameters.dry_masses) != count:
+        raise ConfigurationError(
+            f"parameter dry_masses: {list(parameters.dry_masses)} is not allowed; it must have one for each "
+            f"of the fleet of {count}"
+        )
+
+
 def check_places(deputies: Mapping[str, Any]) -> None:
-    """Refuse two satellites on one place, at the start or after any scheduled change.
+    """Refuse two satellites on one place, at the start or after any scheduled change, and a fleet at odds.
 
     Args:
         deputies: parameters of the guidance of each, by name.
 
     Raises:
-        ConfigurationError: two have one target.
+        ConfigurationError: two have one target, a fleet has a name that does not fly, or its members are not
+            told the same.
     """
+    for name, parameters in deputies.items():
+        strangers = [each for each in parameters.fleet if each not in deputies]
+        if strangers:
+            raise ConfigurationError(
+                f"{name}: fleet has {', '.join(strangers)}, who must be one of the deputies"
+            )
+        for mate in parameters.fleet if parameters.assignment != "fixed" else ():
+            if replace(deputies[mate], slot=0, phase=0.0) != replace(parameters, slot=0, phase=0.0):
+                raise ConfigurationError(
+                    f"{name} and {mate}: their places are shared out, so that their parameters of guidance "
+                    "must be the same but for slot and phase"
+                )
+    deputies = {name: each for name, each in deputies.items() if each.assignment == "fixed"}
     guides = {name: Guide(f"/{name}/guidance", parameters) for name, parameters in deputies.items()}
     for time in sorted({0, *(at for guide in guides.values() for at in guide.foreseen)}):
         states = {}

@@ -3,6 +3,7 @@
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from formation_gnc.orbit.elements import (
 from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
 from formation_gnc.orbit.mean import mean_elements, secular_rates
 from formation_gnc.relative.chief import KeplerChief
-from formation_gnc.relative.hill import HarmonicModel
+from formation_gnc.relative.hill import HarmonicModel, HillModel
 from formation_gnc.relative.model import LinearModel
 from formation_gnc.relative.tschauner_hempel import TschaunerHempelModel
 
@@ -43,6 +44,16 @@ class TargetPath(ABC):
     @abstractmethod
     def states(self, times: Vector) -> Matrix:
         """(N, 6) target states, Hill frame, m and m/s, at times (N,) in s since the start of the run."""
+
+    def coast(self, states: Matrix, time: float, ahead: Vector) -> Matrix:
+        """(K, N, 6) where satellites in states (N, 6) at a time (s) move freely in the model, after times
+        (K,) s."""
+        moved: Matrix = (self._transitions(time, ahead) @ states.T).swapaxes(1, 2)
+        return moved
+
+    @abstractmethod
+    def _transitions(self, time: float, ahead: Vector) -> Matrix:
+        """(K, 6, 6) from a time (s) to times (K,) s after it."""
 
     def error(self) -> tuple[float, float]:
         """What the model is off by, and the size of the path: m, both the greatest over the first revolution.
@@ -91,6 +102,10 @@ class HillPath(TargetPath):
         """(N, 6) states of the formation."""
         return self._formation.states(np.asarray(times) + self._ahead)
 
+    def _transitions(self, time: float, ahead: Vector) -> Matrix:
+        transitions: Matrix = HillModel(self._mission.mean_motion).transition(0.0, ahead)
+        return transitions
+
 
 class _StartedPath(TargetPath):
     """Free motion in another model, from a start that looks like the formation's.
@@ -126,7 +141,10 @@ class YamanakaAnkersenPath(_StartedPath):
 
     def states(self, times: Vector) -> Matrix:
         """(N, 6) states, a transition matrix each."""
-        return np.array([self._model.transition(0.0, float(t)) @ self._state for t in times])
+        return self._transitions(0.0, times) @ self._state
+
+    def _transitions(self, time: float, ahead: Vector) -> Matrix:
+        return np.array([self._model.transition(time, time + float(later)) for later in ahead])
 
 
 @dataclass(frozen=True)
@@ -142,6 +160,7 @@ class J2MeanMotionModel(HarmonicModel):
     anomaly_rate: float
 
     @classmethod
+    @cache  # sharing places out asks for hundreds of paths about one chief
     def of(cls, osculating: Elements) -> "J2MeanMotionModel":
         """The rates of a chief with these osculating elements."""
         _, perigee, anomaly = secular_rates(mean_elements(osculating))
@@ -165,8 +184,11 @@ class J2MeanMotionPath(_StartedPath):
 
     def states(self, times: Vector) -> Matrix:
         """(N, 6) states in closed form."""
-        states: Matrix = self._model.transition(0.0, times) @ self._state
-        return states
+        return self._transitions(0.0, times) @ self._state
+
+    def _transitions(self, time: float, ahead: Vector) -> Matrix:
+        transitions: Matrix = self._model.transition(0.0, ahead)
+        return transitions
 
     def error(self) -> tuple[float, float]:
         """As Hill's: about a point mass, the rates that J2 gives would count as an error."""

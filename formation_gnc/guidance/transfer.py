@@ -5,6 +5,7 @@ does too, and a transfer is to take it to zero.
 """
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from scipy.optimize import linprog
@@ -85,13 +86,19 @@ def delta_v(errors: Matrix, duration: float, mean_motion: float) -> Vector:
     e with the reachability Gramian W: in closed form, smooth in the error, and near what a regulator spends
     that takes as long. Thrust limits are left out.
     """
+    control, step = _least_effort(duration, mean_motion)
+    accelerations = np.tensordot(errors, control, axes=(-1, -1))  # (..., count, 3)
+    total: Vector = np.abs(accelerations).sum(axis=(-2, -1)) * step
+    return total
+
+
+@lru_cache(maxsize=4)
+def _least_effort(duration: float, mean_motion: float) -> tuple[Matrix, float]:
+    """Accelerations (count, 3, 6) by which the least effort answers an error, each held for so long (s)."""
     model = HillModel(mean_motion)
     to_go, step = _stretches(duration, mean_motion)
     effect = model.transition(0.0, to_go) @ model.discretise(0.0, step)[1]  # (count, 6, 3)
     gramian = np.einsum("nik,njk->ij", effect, effect)
     scale = np.repeat([1.0, mean_motion], 3)  # positions and velocities alike, for a well-posed inverse
     inverse = np.linalg.inv(gramian / np.outer(scale, scale)) / np.outer(scale, scale)
-    control = np.einsum("nik,ij->nkj", effect, inverse @ model.transition(0.0, duration))  # (count, 3, 6)
-    accelerations = np.tensordot(errors, control, axes=(-1, -1))  # (..., count, 3)
-    total: Vector = np.abs(accelerations).sum(axis=(-2, -1)) * step
-    return total
+    return np.einsum("nik,ij->nkj", effect, inverse @ model.transition(0.0, duration)), step

@@ -3,15 +3,16 @@
 from formation_gnc.control.autopilot import Autopilot, ControllerParameters
 from formation_gnc.interface import Estimate, Status, Target, Thrust
 from formation_gnc.nodes import topics
+from formation_gnc.nodes.meeting import Wires
 from formation_gnc.nodes.shell import PartNode, run
 
 
 class ControllerNode(PartNode[Autopilot]):
     """Answers each pair of estimate and target with a thrust command and a status."""
 
-    def __init__(self) -> None:
+    def __init__(self, wires: Wires | None = None) -> None:
         """Listen and speak in the deputy's namespace."""
-        super().__init__("controller", ControllerParameters, Autopilot)
+        super().__init__("controller", ControllerParameters, Autopilot, wires)
         self.publish_thrust = self.speak(Thrust, topics.THRUST)
         self.publish_status = self.speak(Status, topics.STATUS)
         self.answer(self.on_tick, {topics.ESTIMATE: Estimate, topics.TARGET: Target})

@@ -20,6 +20,7 @@ FRAME_IDS = {
     interface.Target: "hill",
     interface.Thrust: "hill",
     interface.Status: "hill",
+    interface.Separation: "hill",
 }
 
 

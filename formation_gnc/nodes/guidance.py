@@ -1,23 +1,30 @@
-"""The guidance node: estimates in, targets out."""
+"""The guidance node: estimates in, targets out; in a fleet, predicted separations too."""
 
 from formation_gnc.guidance.guide import GuidanceParameters, Guide
-from formation_gnc.interface import Estimate, Target
+from formation_gnc.interface import Estimate, Separation, Target
 from formation_gnc.nodes import topics
+from formation_gnc.nodes.meeting import Wires
 from formation_gnc.nodes.shell import PartNode, run
 
 
 class GuidanceNode(PartNode[Guide]):
     """Answers each estimate with a target."""
 
-    def __init__(self) -> None:
-        """Listen and speak in the deputy's namespace."""
-        super().__init__("guidance", GuidanceParameters, Guide)
-        self.publish = self.speak(Target, topics.TARGET)
-        self.answer(self.on_tick, {topics.ESTIMATE: Estimate})
+    def __init__(self, wires: Wires | None = None) -> None:
+        """Listen and speak in the deputy's namespace, and listen to the others of a fleet."""
+        super().__init__("guidance", GuidanceParameters, Guide, wires)
+        self.publish = self.say(Target, topics.TARGET)
+        others = {f"/{name}/{topics.ESTIMATE}": Estimate for name in self.part.others}
+        self.answer(self.on_tick, {topics.ESTIMATE: Estimate}, others)
+        if others:
+            self.publish_separation = self.speak(Separation, topics.SEPARATION)
 
-    def on_tick(self, estimate: Estimate) -> None:
-        """One tick."""
-        self.publish(self.part.on_tick(estimate))
+    def on_tick(self, estimate: Estimate, *others: Estimate | None) -> None:
+        """One tick; now and then with a look at how near the others will come."""
+        target, separation = self.part.on_tick(estimate, *others)
+        self.publish(target)
+        if separation is not None:
+            self.publish_separation(separation)
 
 
 def main() -> int:

@@ -180,7 +180,11 @@ def _listener(domain: int, hear: Callable[[Report], None]) -> Iterator[Callable[
 
 
 def fly_graph(
-    scenario: Scenario, bag: Path | None, show: Callable[[Report], None], announce: Callable[[str], None]
+    scenario: Scenario,
+    bag: Path | None,
+    show: Callable[[Report], None],
+    announce: Callable[[str], None],
+    composed: bool = False,
 ) -> Report:
     """Fly a scenario on the node graph.
 
@@ -189,6 +193,7 @@ def fly_graph(
         bag: directory to record to; none for no recorder.
         show: called with the run's progress as it is reported.
         announce: called once with a line that says where the graph can be watched.
+        composed: one process for each satellite, not one for each of its nodes.
 
     Returns:
         The last report of the plant.
@@ -219,8 +224,8 @@ def fly_graph(
                 graph.start("/recorder", [*arguments, "-p", f"bag:={json.dumps(str(bag))}"])
             plant_process = graph.start("/plant", arguments)
             for deputy in scenario.plant.deputies:
-                for part in topics.PARTS:
-                    graph.start(f"/{deputy}/{part}", arguments)
+                for process in ("satellite",) if composed else topics.PARTS:
+                    graph.start(f"/{deputy}/{process}", arguments)
             with _listener(domain, hear) as listen:
                 while plant_process.process.poll() is None:
                     listen(0.1)

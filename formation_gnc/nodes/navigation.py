@@ -3,16 +3,17 @@
 from formation_gnc.interface import Estimate, Measurement
 from formation_gnc.navigation.navigator import NavigationParameters, Navigator
 from formation_gnc.nodes import topics
+from formation_gnc.nodes.meeting import Wires
 from formation_gnc.nodes.shell import PartNode, run
 
 
 class NavigationNode(PartNode[Navigator]):
     """Answers each measurement with an estimate."""
 
-    def __init__(self) -> None:
+    def __init__(self, wires: Wires | None = None) -> None:
         """Listen and speak in the deputy's namespace."""
-        super().__init__("navigation", NavigationParameters, Navigator)
-        self.publish = self.speak(Estimate, topics.ESTIMATE)
+        super().__init__("navigation", NavigationParameters, Navigator, wires)
+        self.publish = self.say(Estimate, topics.ESTIMATE)
         self.answer(self.on_tick, {topics.MEASUREMENT: Measurement})
 
     def on_tick(self, measurement: Measurement) -> None:

@@ -30,6 +30,7 @@ from formation_gnc.errors import ConfigurationError
 from formation_gnc.interface import Event, Timing
 from formation_gnc.nodes import topics
 from formation_gnc.nodes.conversion import blank, from_message, message_type, to_message
+from formation_gnc.nodes.meeting import Meeting, Wires
 from formation_gnc.orbit.propagation import ImpactError
 from formation_gnc.parameters import OWN_OF_ROS, Leaf, dump, leaves, load, read_yaml
 from formation_gnc.part import Part
@@ -99,14 +100,9 @@ class ConfiguredNode(Node):  # type: ignore[misc]
         ended: Callable[[], bool] = asked_to_stop,
         period: Callable[[], float] = lambda: CHECK_PERIOD,
     ) -> None:
-        """Work until `ended` says so, which is asked every `period` (s).
-
-        One executor serves the node for all its life: a message that one has noticed but not handled is
-        lost to the next.
-        """
+        """Work until `ended` says so, which is asked every `period` (s)."""
         if self._executor is None:
-            self._executor = Executor()
-            self._executor.add_node(self)
+            serve(self)
         while not ended():
             self._executor.spin_until_future_complete(Future(), timeout_sec=period())
 
@@ -118,6 +114,15 @@ class ConfiguredNode(Node):  # type: ignore[misc]
         if self._executor is not None:
             self._executor.remove_node(self)
         super().destroy_node()
+
+
+def serve(*nodes: ConfiguredNode) -> None:
+    """Let one executor serve nodes for all their life: a message that one has noticed but not handled is
+    lost to the next."""
+    executor = Executor()
+    for node in nodes:
+        executor.add_node(node)
+        node._executor = executor
 
 
 def _from_command_line(arguments: Sequence[str]) -> Iterator[Parameter]:
@@ -152,11 +157,16 @@ class PartNode[P: Part[Any, Any]](ConfiguredNode):
     the reason if it is refused.
     """
 
-    def __init__(self, name: str, schema: type, part: Callable[[str, Any], P]) -> None:
-        """Build the part from the node's parameters; the namespace is deputy1 unless it is remapped."""
+    def __init__(
+        self, name: str, schema: type, part: Callable[[str, Any], P], wires: Wires | None = None
+    ) -> None:
+        """Build the part from the node's parameters; the namespace is deputy1 unless it is remapped.
+
+        `wires` join it to the parts in the same process.
+        """
         super().__init__(name, schema, namespace="deputy1")
+        self._wires = wires or Wires()
         self.part = part(self.get_fully_qualified_name(), self.values)
-        self._answered: int | None = None
         self._kind = self.get_name()
         self._tell_event = self.speak(Event, topics.EVENTS)
         self._tell_timing = self.speak(Timing, topics.TIMING)
@@ -166,26 +176,52 @@ class PartNode[P: Part[Any, Any]](ConfiguredNode):
             if service.srv_name.endswith(("/set_parameters", "/set_parameters_atomically")):
                 _answer_from(self._designer, service)
 
-    def answer(self, respond: Callable[..., None], inputs: Mapping[str, type]) -> None:
-        """Call `respond` once per stamp, when one record of it is there from every input topic."""
-        latest: dict[str, Any] = {}
-        for topic, record in inputs.items():
+    def say(self, record: type, topic: str) -> Callable[[Any], None]:
+        """A function that publishes a record on a topic that parts in the same process may answer."""
+        publish, hand_on = self.speak(record, topic), self._wires.speak(topic)
 
-            def receive(message: Any, topic: str = topic, record: type = record) -> None:
-                started = perf_counter()
-                latest[topic] = from_message(record, message)
-                times = [each.time for each in latest.values()]
-                if times.count(times[0]) < len(inputs) or times[0] == self._answered:
+        def say(each: Any) -> None:
+            publish(each)
+            hand_on(each)
+
+        return say
+
+    def answer(
+        self,
+        respond: Callable[..., None],
+        inputs: Mapping[str, type],
+        others: Mapping[str, type] | None = None,
+    ) -> None:
+        """Call `respond` once per stamp, when one record of it is there from every input topic.
+
+        `others` are not indispensable, and None when they are lost, as :class:`Meeting` says.
+        """
+        hears = {**inputs, **(others or {})}
+        meeting = Meeting(tuple(hears), len(inputs))
+        for topic, record in hears.items():
+
+            def take(each: Any, topic: str = topic, started: float | None = None) -> None:
+                started = perf_counter() if started is None else started
+                records = meeting.take(topic, each)
+                if records is None:
                     return
-                self._answered = times[0]
-                respond(*(latest[topic] for topic in inputs))
-                self._finish_tick(times[0], started)
+                respond(*records)
+                spent = perf_counter() - started
+                self._wires.deliver()
+                self._finish_tick(records[0].time, spent)
 
-            self.create_subscription(message_type(record), topic, receive, topics.quality(topics.LATEST))
+            def receive(message: Any, record: type = record, take: Callable[..., None] = take) -> None:
+                started = perf_counter()
+                take(from_message(record, message), started=started)
 
-    def _finish_tick(self, time: int, started: float) -> None:
-        """Publish what nobody waits for: the events, and the wall time that the answer took."""
-        self._tell_timing(Timing(time, self._kind, perf_counter() - started))
+            if topic in self._wires:
+                self._wires.hear(topic, take)
+            else:
+                self.create_subscription(message_type(record), topic, receive, topics.quality(topics.LATEST))
+
+    def _finish_tick(self, time: int, spent: float) -> None:
+        """Publish what nobody waits for: the events, and the wall time (s) that the answer took."""
+        self._tell_timing(Timing(time, self._kind, spent))
         for event in self.part.take_events():
             self.get_logger().info(f"tick {event.tick}: {event.kind}: {event.detail}")
             self._tell_event(event)
@@ -214,7 +250,7 @@ def _answer_from(pool: ThreadPoolExecutor, service: Service) -> None:
     )
 
 
-def run(make_node: Callable[[], ConfiguredNode], fly: Callable[[Any], None] = ConfiguredNode.spin) -> int:
+def run(make_node: Callable[[], Any], fly: Callable[[Any], None] = ConfiguredNode.spin) -> int:
     """Body of every executable: make the node, let it fly, and end with the exit status.
 
     A signal is only noted, since a node that has been asked to stop still has to hand over what it published

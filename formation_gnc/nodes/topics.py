@@ -20,6 +20,8 @@ ESTIMATE = "estimate"
 TARGET = "target"
 THRUST = "thrust"
 STATUS = "status"
+SEPARATION = "separation"
+"""Of a deputy in a fleet."""
 TIMING = "timing"
 DEPUTY_TOPICS = (MEASUREMENT, ESTIMATE, TARGET, THRUST, STATUS, TIMING)
 """Relative to the deputy's namespace."""

@@ -39,7 +39,7 @@ class Kind:
 
 KINDS = {
     "navigation": Kind(NavigationParameters, Navigator, ("measurement",), ("estimate",)),
-    "guidance": Kind(GuidanceParameters, Guide, ("estimate",), ("target",)),
+    "guidance": Kind(GuidanceParameters, Guide, ("estimate",), ("target", "separation")),
     "controller": Kind(ControllerParameters, Autopilot, ("estimate", "target"), ("thrust", "status")),
 }
 
@@ -58,6 +58,11 @@ class ReplayedPart:
         self.node = node
         self.kind = KINDS[node.rpartition("/")[2]]
         self.parameters: Any = load(self.kind.schema, values)
+        self.inputs = [_sibling(node, name) for name in self.kind.inputs]
+        deputy = node.rpartition("/")[0].strip("/")
+        fleet = getattr(self.parameters, "fleet", ())
+        self.others = [f"/{name}/estimate" for name in fleet if name != deputy]
+        """Inputs that may be missing."""
         self._heard_last = True
         self.start()
 
@@ -122,7 +127,7 @@ def nodes_of(bag: Bag, kinds: Collection[str]) -> list[str]:
     )
     if not deputies:
         raise ConfigurationError(f"{bag.path}: has no measurements to fly again")
-    return [f"/{deputy}/{kind}" for deputy in deputies for kind in KINDS if kind in kinds]
+    return [f"/{deputy}/{kind}" for kind in KINDS if kind in kinds for deputy in deputies]
 
 
 def replay(bag: Bag, parameters: Mapping[str, Mapping[str, Any]], read: Read, sink: Sink, copy: Copy) -> None:
@@ -130,7 +135,7 @@ def replay(bag: Bag, parameters: Mapping[str, Mapping[str, Any]], read: Read, si
 
     Args:
         bag: the recorded run.
-        parameters: of every node to fly again, by full name, deputy by deputy in the order of `nodes_of`.
+        parameters: of every node to fly again, by full name, in the order of `nodes_of`.
         read: makes records of messages.
         sink: takes topic and record of all that the parts say.
         copy: takes every other message as it was recorded, sorted by stamp.
@@ -189,10 +194,9 @@ def _fly_tick(
                 copy(topic, data, time)
     said: dict[str, Any] = {}
     for part in parts:
-        topics = [_sibling(part.node, name) for name in part.kind.inputs]
         inputs = [
             said.get(topic) if topic in outputs else read(topic, tick[topic][-1]) if topic in tick else None
-            for topic in topics
+            for topic in (*part.inputs, *part.others)
         ]
         timing = _sibling(part.node, "timing")
         is_timed = timing in bag.topics and bag.topics[timing].count > 0
@@ -202,11 +206,13 @@ def _fly_tick(
             continue  # no tick of this deputy
         if not part.heard(part.node in timed or not is_timed, recorded):
             continue
-        if any(each is None for each in inputs):
+        if any(each is None for each in inputs[: len(part.inputs)]):
             continue
         started = perf_counter()
         records, events = part.tick(time, inputs, swaps.get(part.node, []))
         for name, record in zip(part.kind.outputs, records, strict=False):
+            if record is None:
+                continue
             said[_sibling(part.node, name)] = record
             sink(_sibling(part.node, name), record)
         if is_timed:

@@ -1,11 +1,11 @@
 """The in-process runner: the objects of the node graph, called one after the other."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from formation_gnc.control.autopilot import Autopilot
 from formation_gnc.guidance.guide import Guide
-from formation_gnc.interface import Event, Thrust, Vector
+from formation_gnc.interface import Estimate, Event, Thrust, Vector
 from formation_gnc.navigation.navigator import Navigator
 from formation_gnc.part import Part
 from formation_gnc.plant.plant import Plant
@@ -27,27 +27,25 @@ class Satellite:
         self.autopilot = Autopilot(f"/{name}/controller", setup.controller)
         self.parts: tuple[Part[Any, Any], ...] = (self.navigator, self.guide, self.autopilot)
 
-    def on_tick(self, measurement: Any, sink: Sink) -> Thrust | None:
-        """From measurement to thrust; none when there is no estimate to act on."""
-        thrust = self._answer(measurement, sink)
+    def on_tick(self, estimates: Mapping[str, Estimate | None], sink: Sink) -> Thrust | None:
+        """From the estimates of all deputies to thrust; none when there is no estimate to act on."""
+        estimate, thrust = estimates[self.name], None
+        if estimate is not None:
+            others = [estimates[name] for name in self.guide.others]
+            target, separation = self.guide.on_tick(estimate, *others)
+            thrust, status = self.autopilot.on_tick(estimate, target)
+            for topic, record in (
+                ("estimate", estimate),
+                ("target", target),
+                ("separation", separation),
+                ("thrust", thrust),
+                ("status", status),
+            ):
+                if record is not None:
+                    sink(f"/{self.name}/{topic}", record)
         for part in self.parts:
             for event in part.take_events():
                 sink("/events", event)
-        return thrust
-
-    def _answer(self, measurement: Any, sink: Sink) -> Thrust | None:
-        estimate = self.navigator.on_tick(measurement)
-        if estimate is None:
-            return None
-        target = self.guide.on_tick(estimate)
-        thrust, status = self.autopilot.on_tick(estimate, target)
-        for topic, record in (
-            ("estimate", estimate),
-            ("target", target),
-            ("thrust", thrust),
-            ("status", status),
-        ):
-            sink(f"/{self.name}/{topic}", record)
         return thrust
 
 
@@ -64,11 +62,12 @@ class Run:
         """Fly one tick and hand every record to `sink`."""
         measurements = self.plant.measure()
         sink("/truth", self.plant.truth())
+        for name, measurement in measurements.items():
+            sink(f"/{name}/measurement", measurement)
+        estimates = {each.name: each.navigator.on_tick(measurements[each.name]) for each in self.satellites}
         forces: dict[str, Vector] = {}
         for satellite in self.satellites:
-            measurement = measurements[satellite.name]
-            sink(f"/{satellite.name}/measurement", measurement)
-            thrust = satellite.on_tick(measurement, sink)
+            thrust = satellite.on_tick(estimates, sink)
             if thrust is not None:
                 forces[satellite.name] = thrust.force
         tick, time = self.plant.tick, self.plant.time

@@ -143,7 +143,7 @@ def at() -> Callable[[float], Estimate]:
 
 
 def test_the_target_is_the_formations_state_at_the_stamp(at: Callable[[float], Estimate]) -> None:
-    target = guide(formation="relative_orbit", relative_orbit__rho=300.0).on_tick(at(77.0))
+    target = guide(formation="relative_orbit", relative_orbit__rho=300.0).on_tick(at(77.0))[0]
     formation = RelativeOrbit(RelativeOrbitParameters(rho=300.0), OMEGA)
     assert (target.time, target.formation) == (77 * NANOSECONDS, "relative_orbit")
     assert target.relative_state.tolist() == formation.states(np.array([77.0]))[0].tolist()
@@ -152,19 +152,19 @@ def test_the_target_is_the_formations_state_at_the_stamp(at: Callable[[float], E
 
 def test_the_preview_is_where_the_target_will_be(at: Callable[[float], Estimate]) -> None:
     ahead = guide(formation="relative_orbit", preview_steps=4, preview_step=30.0)
-    preview = ahead.on_tick(at(10.0)).preview
-    later = [ahead.on_tick(at(10.0 + 30.0 * step)).relative_state.tolist() for step in (1, 2, 3, 4)]
+    preview = ahead.on_tick(at(10.0))[0].preview
+    later = [ahead.on_tick(at(10.0 + 30.0 * step))[0].relative_state.tolist() for step in (1, 2, 3, 4)]
     assert preview.tolist() == later
 
 
 def test_a_formation_is_swapped_in_flight_at_a_tick(at: Callable[[float], Estimate]) -> None:
     swapped = guide(schedule=["{at: 20, formation: relative_orbit, relative_orbit.rho: 50}"])
-    assert swapped.on_tick(at(19.0)).relative_state.tolist() == [0.0, -100.0, 0.0, 0.0, 0.0, 0.0]
-    target = swapped.on_tick(at(20.0))
+    assert swapped.on_tick(at(19.0))[0].relative_state.tolist() == [0.0, -100.0, 0.0, 0.0, 0.0, 0.0]
+    target, _ = swapped.on_tick(at(20.0))
     assert target.formation == "relative_orbit"
     assert np.abs(target.relative_state[0]) <= 50.0
     swapped.adopt(swapped.prepare({"formation": "leader_follower", "leader_follower.separation": 40.0}))
-    assert swapped.on_tick(at(21.0)).relative_state.tolist() == [0.0, -40.0, 0.0, 0.0, 0.0, 0.0]
+    assert swapped.on_tick(at(21.0))[0].relative_state.tolist() == [0.0, -40.0, 0.0, 0.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize(

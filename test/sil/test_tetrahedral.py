@@ -1,12 +1,20 @@
 """Four satellites, from a tetrahedron to three in plane and one out, in flight."""
 
+from collections.abc import Callable
+from pathlib import Path
+
 import numpy as np
 import pytest
+import yaml
 
+from formation_gnc.analysis.compare import gnc_topics
 from formation_gnc.analysis.separation import minimum_separation
 from formation_gnc.interface import Event, Truth
+from formation_gnc.recording.reader import Bag, identical
 from formation_gnc.sil.runner import Run
-from formation_gnc.sil.scenario import load_scenario
+from formation_gnc.sil.scenario import find_scenario, load_scenario
+
+from .conftest import Sil
 
 CHANGE = 8890
 
@@ -47,3 +55,41 @@ def test_the_scenario_puts_four_on_four_places_with_one_change_each() -> None:
     guidances = [setup.guidance for setup in scenario.deputies.values()]
     assert [guidance.slot for guidance in guidances] == [0, 1, 2, 3]
     assert all(len(guidance.schedule) == 1 for guidance in guidances)
+
+
+@pytest.mark.sil
+def test_a_fleet_flies_the_same_bits_on_the_graph_composed_in_process_and_again(
+    sil: Callable[..., Sil], tmp_path: Path
+) -> None:
+    document = yaml.safe_load(find_scenario("tetrahedral").read_text())
+    document["/**/guidance"]["ros__parameters"] |= {
+        "assignment": "delta_v",
+        "schedule": ["{at: 40.0, formation: three_in_plane_one_out}"],
+        "separation_interval": 10.0,
+        "separation_warning": 300.0,
+    }
+    scenario = tmp_path / "early.yaml"
+    scenario.write_text(yaml.safe_dump(document))
+    bags = {}
+    for name in ("graph", "composed", "in-process"):
+        options = [] if name == "graph" else [f"--{name}"]
+        run = sil("--duration", "120", *options, directory=tmp_path / name, scenario=str(scenario))
+        status, _, errors = run.finish()
+        assert status == 0, errors
+        bags[name] = Bag(run.bag)
+    graph = bags["graph"]
+    for other in ("composed", "in-process"):
+        topics = gnc_topics(graph, bags[other])
+        assert {f"/deputy{k}/separation" for k in (1, 2, 3, 4)} < set(topics)
+        assert identical(graph, bags[other], topics) == []
+    events = graph.arrays("/events")
+    kinds = events["kind"].tolist()
+    assert kinds.count("assignment") == 8  # at the start and at the change, by each for itself
+    assert kinds.count("reconfiguration") == 4
+    places = [
+        detail.split("place ")[1].split(",")[0]
+        for detail, kind, tick in zip(events["detail"].tolist(), kinds, events["tick"].tolist(), strict=True)
+        if kind == "assignment" and tick == 40
+    ]
+    assert sorted(places) == ["0", "1", "2", "3"]
+    assert graph.arrays("/deputy1/target")["others"].shape == (120, 18)

@@ -1,0 +1,59 @@
+"""How near satellites will come to one another."""
+
+import math
+
+import numpy as np
+
+from formation_gnc.guidance.targets import TargetPath
+from formation_gnc.interface import NANOSECONDS, Matrix, Separation, Target, Vector
+
+POINTS = 60
+"""Points of a revolution at which distances are looked at; between two, satellites move straight on, which
+leaves out a thousandth of the distance."""
+
+
+def predict(
+    path: TargetPath, target: Target, state: Vector, names: list[str], horizon: float, mean_motion: float
+) -> Separation:
+    """Least distance of a satellite to the others: along its preview, and if nobody's thrusters fire.
+
+    Args:
+        path: gives the model in which satellites coast.
+        target: where the satellite is to be, with the preview, and where the others are, who coast.
+        state: (6,) where it is, Hill frame, m and m/s.
+        names: of the others, one or more.
+        horizon: revolutions for which all coast.
+        mean_motion: rate of the chief, rad/s.
+    """
+    time = target.time / NANOSECONDS
+    ahead = target.preview_step * np.arange(len(target.preview) + 1.0)
+    planned = np.vstack([target.relative_state, target.preview])[:, None] - path.coast(
+        target.others, time, ahead
+    )
+    later: Vector = np.linspace(0.0, horizon * math.tau / mean_motion, math.ceil(horizon * POINTS) + 1)
+    passive = path.coast(state - target.others, time, later)
+    near, far = _nearest(planned, ahead), _nearest(passive, later)
+    return Separation(
+        target.time, near[0], time + near[1], names[near[2]], far[0], time + far[1], names[far[2]]
+    )
+
+
+def in_words(separation: Separation) -> str:
+    """For an event."""
+    return (
+        f"{separation.planned:.1f} m from {separation.planned_other} at {separation.planned_time:.0f} s on "
+        f"target, {separation.passive:.1f} m from {separation.passive_other} at "
+        f"{separation.passive_time:.0f} s without thrust"
+    )
+
+
+def _nearest(offsets: Matrix, times: Vector) -> tuple[float, float, int]:
+    """Least distance (m), when (s) and of whom, given relative states (K, N, 6) at times (K,)."""
+    position, velocity = offsets[..., :3], offsets[..., 3:]
+    half = 0.5 * np.gradient(times)[:, None] if len(times) > 1 else np.zeros((1, 1))
+    speed = np.maximum((velocity**2).sum(axis=-1), 1e-300)
+    later = np.clip(-(position * velocity).sum(axis=-1) / speed, -half, half)
+    later[0], later[-1] = np.maximum(later[0], 0.0), np.minimum(later[-1], 0.0)
+    distances = np.linalg.norm(position + later[..., None] * velocity, axis=-1)
+    index, who = np.unravel_index(distances.argmin(), distances.shape)
+    return float(distances[index, who]), float(times[index] + later[index, who]), int(who)

@@ -1,0 +1,223 @@
+"""What a guidance does in a fleet: others in its target, predicted separations, shared places."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.guidance.guide import GuidanceParameters, Guide, check_places
+from formation_gnc.interface import NANOSECONDS, Estimate, Target
+from formation_gnc.parameters import load
+
+Array = NDArray[np.float64]
+
+FLEET = ("deputy1", "deputy2", "deputy3", "deputy4")
+RING = {"formation": "projected_circular_orbit", "projected_circular_orbit.satellites": 4}
+
+
+def parameters(**values: Any) -> Any:
+    given = {name.replace("__", "."): value for name, value in values.items()}
+    return load(GuidanceParameters, {"chief.semi_major_axis": 7.0e6, "fleet": FLEET} | RING | given)
+
+
+def estimate(state: Array, seconds: float = 0.0, mass: float = 100.0) -> Estimate:
+    return Estimate(
+        round(seconds * NANOSECONDS), state, np.eye(6), np.zeros(6), mass, False, [], [], [], 0.0, 0
+    )
+
+
+def fly(
+    guides: Mapping[str, Guide], states: Array, seconds: float = 0.0, masses: tuple[float, ...] = (100.0,) * 4
+) -> list[Target]:
+    """One tick of all guidances."""
+    seen = {
+        name: estimate(state, seconds, mass) for name, state, mass in zip(guides, states, masses, strict=True)
+    }
+    return [
+        guide.on_tick(seen[name], *(seen[other] for other in guide.others))[0]
+        for name, guide in guides.items()
+    ]
+
+
+def guides(**values: Any) -> dict[str, Guide]:
+    return {name: Guide(f"/{name}/guidance", parameters(**values)) for name in FLEET}
+
+
+def on_the_ring(phase: float) -> Array:
+    """States of the four on their own places of a ring."""
+    found = [
+        Guide("/deputy1/guidance", parameters(slot=slot, phase=phase)).configuration.design.states(
+            np.zeros(1)
+        )[0]
+        for slot in range(4)
+    ]
+    return np.array(found)
+
+
+def test_the_others_come_with_the_target_in_the_order_of_the_fleet() -> None:
+    states = on_the_ring(0.0)
+    guide = Guide("/deputy2/guidance", parameters(slot=1))
+    assert guide.others == ("deputy1", "deputy3", "deputy4")
+    target, _ = guide.on_tick(estimate(states[1]), estimate(states[0]), None, estimate(states[3]))
+    assert target.others.tolist() == [states[0].tolist(), states[3].tolist()]
+    broken, _ = guide.on_tick(
+        estimate(states[1], 1.0), estimate(states[0], 1.0), estimate(np.full(6, np.nan), 1.0), None
+    )
+    assert broken.others.tolist() == [states[0].tolist()]
+
+
+def test_alone_there_is_nobody_and_nothing_to_predict() -> None:
+    target, separation = Guide("/deputy1/guidance", parameters(fleet=())).on_tick(estimate(np.ones(6)))
+    assert target.others.shape == (0, 6)
+    assert separation is None
+
+
+def test_neighbours_on_a_ring_are_predicted_to_keep_the_side_of_its_square() -> None:
+    states = on_the_ring(0.3)
+    guide = Guide("/deputy1/guidance", parameters(phase=0.3, preview_steps=50, preview_step=60.0))
+    _, separation = guide.on_tick(*map(estimate, states))
+    assert separation is not None
+    # positions at right angles on y^2 + z^2 = 1 km, radially up to half as much more: |d|^2 = 2 + (dx)^2 with
+    # dx of amplitude sqrt(2)/2, zero four times in two revolutions
+    assert separation.passive == pytest.approx(1000.0 * math.sqrt(2.0), rel=2e-3)
+    assert separation.planned == pytest.approx(1000.0 * math.sqrt(2.0), rel=2e-3)
+    assert separation.passive_other in ("deputy2", "deputy4")
+
+
+def test_a_collision_course_is_found_between_the_points_and_told_once() -> None:
+    guide = Guide("/deputy1/guidance", parameters(fleet=("deputy1", "deputy2"), separation_warning=20.0))
+    n = guide.parameters.mean_motion
+    behind, ahead = np.zeros(6), np.zeros(6)
+    behind[1], ahead[1] = -1000.0, 1000.0
+    drifting = ahead.copy()
+    drifting[0] = 2000.0 / (3.0 * math.pi)
+    # x = c, y' = -3/2 n c is free motion that falls back 3 pi c in a revolution: as far as the other one
+    drifting[4] = -1.5 * n * drifting[0]
+    _, separation = guide.on_tick(estimate(behind), estimate(drifting))
+    assert separation is not None
+    assert separation.passive == pytest.approx(drifting[0], rel=1e-6)  # passes above at that height
+    assert separation.passive_time == pytest.approx(2000.0 / (1.5 * n * drifting[0]), rel=1e-6)
+    assert not [event for event in guide.take_events() if event.kind == "separation"]
+    drifting[0] *= 0.04
+    drifting[4] *= 0.04
+    drifting[1] = -900.0
+    assert guide.on_tick(estimate(behind, 30.0), estimate(drifting, 30.0))[1] is None  # not due yet
+    told = []
+    for seconds in (60.0, 120.0):
+        _, separation = guide.on_tick(estimate(behind, seconds), estimate(drifting, seconds))
+        assert separation is not None
+        assert separation.passive < 20.0
+        told += [event.detail for event in guide.take_events() if event.kind == "separation"]
+    assert len(told) == 1
+    guide.on_tick(estimate(behind, 180.0), estimate(ahead, 180.0))
+    assert [event.detail for event in guide.take_events() if event.kind == "separation"] == ["over"]
+
+
+@pytest.mark.parametrize("model", ["hill", "j2_mean_motion", "yamanaka_ankersen"])
+def test_all_guidances_of_a_fleet_find_the_same_places_and_the_phase_where_they_are(model: str) -> None:
+    order = [2, 0, 3, 1]
+    states = on_the_ring(1.234)[order]
+    fleet = guides(assignment="delta_v", model=model)
+    targets = fly(fleet, states)
+    phases = {guide.parameters.phase for guide in fleet.values()}
+    assert len(phases) == 1
+    assert sorted(guide.parameters.slot for guide in fleet.values()) == [0, 1, 2, 3]
+    # on the ring already, and so at home; the rates of J2 make the start a little different
+    off = [
+        np.linalg.norm((target.relative_state - state)[:3])
+        for target, state in zip(targets, states, strict=True)
+    ]
+    assert max(off) < (1e-2 if model == "hill" else 5.0)
+    assert [event.kind for event in fleet["deputy1"].take_events()] == ["assignment"]
+
+
+def test_places_are_shared_out_again_when_the_schedule_changes_the_formation() -> None:
+    change = "{at: 100.0, formation: three_in_plane_one_out}"
+    fleet = guides(assignment="delta_v", formation="tetrahedral", schedule=(change,))
+    start = on_the_ring(0.0)
+    before = fly(fleet, start)
+    states = np.array([target.relative_state for target in before])
+    after = fly(fleet, states, 100.0)
+    assert {target.formation for target in after} == {"three_in_plane_one_out"}
+    assert sorted(guide.parameters.slot for guide in fleet.values()) == [0, 1, 2, 3]
+    kinds = [event.kind for event in fleet["deputy3"].take_events()]
+    assert kinds == ["assignment", "parameters", "assignment", "reconfiguration"]
+
+
+def test_with_fuel_who_has_little_left_goes_the_shorter_way() -> None:
+    # places 1 and 2 km behind: both satellites are nearer to the far one, deputy2 by more
+    values: dict[str, Any] = {
+        "fleet": ("deputy1", "deputy2"),
+        "formation": "leader_follower",
+        "leader_follower__separation": 1000.0,
+        "dry_masses": (90.0, 90.0),
+    }
+    states = np.zeros((2, 6))
+    states[:, 1] = -1600.0, -1700.0
+
+    def places(assignment: str, masses: tuple[float, float]) -> list[int]:
+        fleet = {
+            name: Guide(f"/{name}/guidance", parameters(**values, assignment=assignment))
+            for name in ("deputy1", "deputy2")
+        }
+        fly(fleet, states, masses=masses)
+        return [guide.parameters.slot for guide in fleet.values()]
+
+    assert places("delta_v", (91.0, 99.0)) == [0, 1]  # 600 m and 300 m
+    assert places("fuel", (99.0, 99.0)) == [0, 1]
+    assert places("fuel", (91.0, 99.0)) == [1, 0]  # 400 m and 700 m
+    assert places("fuel", (90.0, 99.0)) == [1, 0]  # an empty tank counts as nearly empty
+
+
+def test_without_a_state_of_everybody_places_stay() -> None:
+    guide = Guide("/deputy1/guidance", parameters(assignment="delta_v", slot=2))
+    states = on_the_ring(0.0)
+    guide.on_tick(estimate(states[0]), estimate(states[1]), None, estimate(states[3]))
+    assert guide.parameters.slot == 2
+    (event,) = guide.take_events()
+    assert (event.kind, "deputy3" in event.detail) == ("warning", True)
+
+
+@pytest.mark.parametrize(
+    ("values", "reason"),
+    [
+        ({"fleet": ("deputy2", "deputy3")}, "deputy1 must be one of it"),
+        ({"fleet": ("deputy1", "deputy1")}, "twice"),
+        ({"fleet": (), "assignment": "delta_v"}, "without a fleet"),
+        ({"projected_circular_orbit__satellites": 3, "assignment": "delta_v"}, "3 places for a fleet of 4"),
+        ({"assignment": "fuel"}, "one for each"),
+        (
+            {
+                "assignment": "delta_v",
+                "schedule": ("{at: 9.0, formation: relative_orbit}",),
+            },
+            "1 places for a fleet of 4",
+        ),
+    ],
+)
+def test_a_fleet_that_cannot_be_is_refused(values: dict[str, Any], reason: str) -> None:
+    with pytest.raises(ConfigurationError, match=reason):
+        Guide("/deputy1/guidance", parameters(**values))
+
+
+def test_one_alone_may_not_change_what_is_shared_out() -> None:
+    guide = Guide("/deputy1/guidance", parameters(assignment="delta_v"))
+    with pytest.raises(ConfigurationError, match="by schedule only"):
+        guide.prepare({"formation": "tetrahedral"})
+    guide.prepare({"separation_warning": 5.0})
+
+
+def test_a_fleet_at_odds_is_refused_at_the_start() -> None:
+    shared = parameters(assignment="delta_v")
+    check_places(dict.fromkeys(FLEET, shared))
+    check_places(dict.fromkeys(FLEET, shared) | {"deputy4": parameters(assignment="delta_v", slot=3)})
+    with pytest.raises(ConfigurationError, match="must be the same"):
+        check_places(dict.fromkeys(FLEET, shared) | {"deputy4": parameters(slot=3)})
+    with pytest.raises(ConfigurationError, match="deputy4, who must be"):
+        check_places(dict.fromkeys(FLEET[:3], shared))
+    with pytest.raises(ConfigurationError, match="on one place"):
+        check_places(dict.fromkeys(FLEET, parameters()))

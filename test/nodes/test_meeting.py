@@ -1,0 +1,73 @@
+"""What belongs to one stamp comes together, whatever the order in which it arrives."""
+
+from dataclasses import dataclass
+from itertools import permutations
+
+import pytest
+
+from formation_gnc.nodes.meeting import Meeting, Wires
+
+OWN, SECOND, THIRD = "estimate", "/deputy2/estimate", "/deputy3/estimate"
+
+
+@dataclass
+class At:
+    time: int
+
+
+@pytest.fixture
+def fleet() -> Meeting:
+    """A satellite and two others, whom it can do without."""
+    return Meeting((OWN, SECOND, THIRD), needed=1)
+
+
+def answers(meeting: Meeting, *arrivals: tuple[str, int]) -> list[list[int | None]]:
+    """The stamps of what was put together, each time it was."""
+    came = [meeting.take(topic, At(time)) for topic, time in arrivals]
+    return [[each and each.time for each in records] for records in came if records is not None]
+
+
+@pytest.mark.parametrize("order", list(permutations((OWN, SECOND, THIRD))))
+def test_any_order_of_arrival_gives_one_answer_per_stamp(fleet: Meeting, order: tuple[str, ...]) -> None:
+    arrivals = [(topic, time) for time in (10, 20) for topic in order]
+    assert answers(fleet, *arrivals) == [[10, 10, 10], [20, 20, 20]]
+
+
+def test_a_repeated_record_is_not_answered_again(fleet: Meeting) -> None:
+    assert len(answers(fleet, (SECOND, 10), (THIRD, 10), (OWN, 10), (OWN, 10), (SECOND, 10))) == 1
+
+
+def test_who_is_silent_costs_one_tick_and_is_then_done_without(fleet: Meeting) -> None:
+    assert answers(fleet, (OWN, 10), (SECOND, 10)) == []
+    # the run goes on: the third was missing, the second was not, and is waited for
+    assert answers(fleet, (OWN, 20)) == []
+    assert answers(fleet, (SECOND, 20)) == [[20, 20, None]]
+    assert answers(fleet, (SECOND, 30), (OWN, 30)) == [[30, 30, None]]
+
+
+def test_who_speaks_again_is_waited_for_again(fleet: Meeting) -> None:
+    answers(fleet, (OWN, 10), (SECOND, 10), (OWN, 20), (SECOND, 20))
+    assert answers(fleet, (THIRD, 10)) == []  # of long ago: still lost
+    assert answers(fleet, (OWN, 30), (SECOND, 30)) == [[30, 30, None]]
+    assert answers(fleet, (THIRD, 30), (OWN, 40), (SECOND, 40)) == []
+    assert answers(fleet, (THIRD, 40)) == [[40, 40, 40]]
+
+
+def test_what_is_needed_is_never_done_without() -> None:
+    pair = Meeting(("estimate", "target"), needed=2)
+    assert answers(pair, ("estimate", 10), ("estimate", 20), ("estimate", 30)) == []
+    assert answers(pair, ("target", 30)) == [[30, 30]]
+
+
+def test_wires_hand_on_in_the_order_of_speech_and_to_the_last_listener_first() -> None:
+    wires, heard = Wires(), list[tuple[str, int]]()
+    say = wires.speak("estimate")
+    wires.hear("estimate", lambda record: heard.append(("guidance", record)))
+    wires.hear("estimate", lambda record: heard.append(("controller", record)))
+    assert "estimate" in wires
+    assert "target" not in wires
+    say(1)
+    say(2)
+    assert heard == []
+    wires.deliver()
+    assert heard == [("controller", 1), ("guidance", 1), ("controller", 2), ("guidance", 2)]
