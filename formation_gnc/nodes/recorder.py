@@ -32,6 +32,10 @@ from formation_gnc.recording.writer import FLUSH_INTERVAL, BagWriter, Split
 LOOK_PERIOD = 0.1
 """Wall time (s) between looks for new topics and nodes, and between reports of progress."""
 
+ASK_AGAIN = 2.0
+"""Wall time (s) after which a node is asked for its parameters again: ROS gives up an answer to who is
+not yet known to listen, which happens when many nodes start on a busy machine."""
+
 REPORT_TICKS = 64
 """Ticks after which progress is reported at the latest."""
 
@@ -94,6 +98,7 @@ class RecorderNode(ConfiguredNode):
         self._losses: dict[str, LossCounter] = {}
         self._lost = 0
         self._askable: dict[str, AsyncParameterClient] = {}
+        self._asked: dict[str, float] = {}
         self._settings: dict[str, dict[str, Any]] = {}
         self._heard: dict[str, int] = {}
         self._reported: int | None = None
@@ -130,8 +135,9 @@ class RecorderNode(ConfiguredNode):
             if kind == "get_parameters" and node not in self._askable:
                 self._askable[node] = AsyncParameterClient(self, node)
         for node, client in self._askable.items():
-            if node not in self._settings and client.services_are_ready():
-                self._settings[node] = {}
+            is_due = monotonic() - self._asked.get(node, -ASK_AGAIN) >= ASK_AGAIN
+            if node not in self._settings and is_due and client.services_are_ready():
+                self._asked[node] = monotonic()
                 self._ask_parameters(node, client)
         if self._knows_the_run():
             self._report()
@@ -196,6 +202,8 @@ class RecorderNode(ConfiguredNode):
             client.get_parameters(names, callback=lambda values: on_values(names, values))
 
         def on_values(names: list[str], answer: Future) -> None:
+            if node in self._settings:
+                return  # asked twice, and answered twice
             self._settings[node] = {
                 name: parameter_value_to_python(value)
                 for name, value in zip(names, answer.result().values, strict=True)
