@@ -4,8 +4,11 @@ import json
 import os
 import random
 import signal
+import subprocess
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -100,6 +103,55 @@ def test_nodes_started_by_hand_in_any_order_fly_and_swap_the_law_in_flight(desk:
     assert np.all(thrust["force"][tick + 10 :] == 0.0)
     for topic in GNC_TOPICS:
         assert np.array_equal(recorded.arrays(topic)["stamp_ns"], np.arange(600) * 1_000_000_000)
+
+
+@pytest.fixture
+def load() -> Iterator[None]:
+    """Every core busy with something else."""
+    burners = [
+        subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(os.cpu_count() or 1)
+    ]
+    yield
+    for burner in burners:
+        burner.kill()
+        burner.wait()
+
+
+def test_two_rounds_of_laws_under_load_miss_no_tick_and_step_no_further_than_the_bound(
+    desk: Desk, load: None
+) -> None:
+    bag = desk.directory / "bag"
+    desk.start("recorder", bag=bag)
+    plant = desk.start("plant", duration=10_000.0, real_time_factor=100.0, wait_for_recorder=True)
+    terminals = {kind: desk.start(kind) for kind in PARTS}
+    wait_until(lambda: "acquired" in terminals["navigation"].text, "the first estimate")
+    laws = ["lqr", *("hinf", "mpc", "hinf", "lqr") * 2]
+    for law in laws[1:]:
+        accepted, reason = set_parameter(desk, "/deputy1/controller", "algorithm", law)
+        assert accepted, reason
+    assert plant.process.poll() is None, "the flight was too short for all swaps"
+    for terminal in (plant, *terminals.values(), desk.terminals[0]):
+        terminal.signal(signal.SIGINT)
+        assert terminal.wait() == 0, terminal.text
+
+    recorded = Bag(bag)
+    assert events(bag, "miss") == []
+    assert events(bag, "fallback") == []
+    thrust, status = recorded.arrays("/deputy1/thrust"), recorded.arrays("/deputy1/status")
+    ticks = len(thrust["stamp_ns"])
+    assert np.array_equal(thrust["stamp_ns"], np.arange(ticks) * 1_000_000_000)
+    assert ticks >= recorded.topics["/truth"].count - 1, "the plant may be stopped within a tick"
+    handovers = events(bag, "handover")
+    assert [detail.split(":")[0] for _, detail in handovers] == [
+        f"{old} -> {new}" for old, new in pairwise(laws)
+    ]
+    at = [tick for tick, _ in handovers]
+    assert list(status["algorithm"]) == [
+        law for law, begin, end in zip(laws, [0, *at], [*at, ticks], strict=True) for _ in range(begin, end)
+    ]
+    # a tenth of the 10 mN limit
+    steps = np.abs(np.diff(thrust["force"], axis=0)).max(axis=1)
+    assert (steps[np.array(at) - 1] <= 0.001 * (1.0 + 1e-12)).all()
 
 
 def test_the_plant_waits_and_says_for_whom(desk: Desk) -> None:
