@@ -7,14 +7,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from formation_gnc.analysis.compare import gnc_topics
 from formation_gnc.cli import main
 from formation_gnc.nodes.record_in_process import reader
-from formation_gnc.recording.reader import Bag, identical
+from formation_gnc.recording.reader import Bag, identical, read
 from formation_gnc.sil.replay import KINDS, nodes_of, parameters_of, replay
-from formation_gnc.sil.scenario import find_scenario
+from formation_gnc.sil.scenario import find_scenario, load_scenario
 
 
 @pytest.fixture(autouse=True)
@@ -196,3 +197,28 @@ def test_replay_refuses_what_it_cannot_fly(
     ):
         assert main(["replay", str(flown), "--bag", str(tmp_path / "no"), *arguments]) == 2
         assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet"])
+def test_export_writes_every_topic_or_those_asked_for_and_the_attachments(
+    flown: Path, tmp_path: Path, form: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    everything, some = tmp_path / "all", tmp_path / "some"
+    assert main(["export", str(flown), "--format", form, "--output", str(everything), "--attachments"]) == 0
+    bag = Bag(flown)
+    written = {path.name for path in everything.iterdir()}
+    filled = {topic.strip("/").replace("/", ".") for topic, each in bag.topics.items() if each.count}
+    assert written == {f"{topic}.{form}" for topic in filled} | set(bag.attachments)
+    assert load_scenario(str(everything / "leader_follower.yaml")).plant.duration == 300.0, (
+        "to be flown again"
+    )
+    assert main(["export", str(flown), "--format", form, "--topic", "/truth", "--output", str(some)]) == 0
+    (table,) = some.iterdir()
+    frame = pd.read_csv(table) if form == "csv" else pd.read_parquet(table)
+    assert frame["deputies.0.mass"].tolist() == bag.arrays("/truth")["deputies.0.mass"].tolist()
+    assert read(flown)["/truth"]["deputies.0.mass"].tolist() == frame["deputies.0.mass"].tolist()
+    capsys.readouterr()
+    assert main(["export", str(flown), "--topic", "/nothing", "--output", str(some)]) == 2
+    assert "has no topic /nothing" in capsys.readouterr().err
+    assert main(["export", str(flown), "--output", "/proc/nowhere"]) == 2
+    assert "export to /proc/nowhere: " in capsys.readouterr().err

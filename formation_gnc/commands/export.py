@@ -1,0 +1,46 @@
+"""Write topics of a recorded run as CSV or Parquet, and the files that it carries.
+
+A file a topic, `deputy1.estimate.csv` for /deputy1/estimate; a row a message, a column a field or an element
+of an array. In Python, `formation_gnc.recording.read(bag)` gives the same as pandas frames.
+"""
+
+import argparse
+from pathlib import Path
+
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.recording.export import export
+from formation_gnc.recording.reader import Bag
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the command."""
+    parser.add_argument("bag", type=Path, help="bag directory or .mcap file")
+    parser.add_argument(
+        "--topic", metavar="NAME", action="append", help="a topic to write, as often as wanted (default: all)"
+    )
+    parser.add_argument("--format", choices=("csv", "parquet"), default="csv", help="default: csv")
+    parser.add_argument("--attachments", action="store_true", help="write the attached files too")
+    parser.add_argument(
+        "--output", metavar="DIR", type=Path, help="directory to write to (default: BAG_export)"
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write every topic that has messages, and say where."""
+    bag = Bag(options.bag)
+    source = options.bag.absolute()
+    directory = options.output or source.with_name(f"{source.stem}_export")
+    filled = [name for name, topic in bag.topics.items() if topic.count]
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        for topic in options.topic or sorted(filled):
+            path = directory / f"{topic.strip('/').replace('/', '.')}.{options.format}"
+            export(bag, topic, path)
+            print(f"{topic}: {bag.topics[topic].count} messages in {path}")
+        for name, data in bag.attachments.items() if options.attachments else ():
+            path = directory / Path(name).name
+            path.write_bytes(data)
+            print(f"{name}: {path}")
+    except OSError as error:
+        raise ConfigurationError(f"export to {error.filename}: {error.strerror}") from None
+    return 0
