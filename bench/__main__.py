@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from bench import control, dynamics, graph, navigation
+from bench import control, dynamics, graph, navigation, recording
 from bench.result import Result
 
 BENCHMARKS = {
@@ -17,6 +17,7 @@ BENCHMARKS = {
     "dynamics": dynamics.run,
     "navigation": navigation.run,
     "control": control.run,
+    "recording": recording.run,
 }
 OUTPUT = Path("build/bench.json")
 

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from formation_gnc.analysis.flown import POINTS, Flown, Thinned
 from formation_gnc.analysis.metrics import figures
-from formation_gnc.analysis.report import POINTS, _Thinned, write_report
+from formation_gnc.analysis.report import write_report
 from formation_gnc.nodes.record_in_process import InProcessRecorder
 from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.writer import BagWriter
@@ -37,7 +38,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Bag:
 
 @pytest.fixture(scope="module")
 def page(bag: Bag) -> Path:
-    return write_report(bag, bag.path / "report.html", "a <title>")
+    return write_report(bag, Flown(bag), bag.path / "report.html", "a <title>")
 
 
 def test_the_page_is_self_contained_and_says_what_was_flown(page: Path, bag: Bag) -> None:
@@ -54,7 +55,7 @@ def test_the_page_is_self_contained_and_says_what_was_flown(page: Path, bag: Bag
 
 
 def test_a_curve_never_has_more_than_twice_the_points_and_keeps_even_steps() -> None:
-    thinned = _Thinned(1)
+    thinned = Thinned(1)
     for start in range(0, 50_000, 777):
         thinned.add(np.arange(start, start + 777, dtype=float)[:, None])
         assert len(thinned.rows) <= 2 * POINTS

@@ -73,9 +73,9 @@ def deputies_of(bag: Bag) -> list[str]:
     """Names of the deputies in a bag, in its own order of truth."""
     if "/truth" not in bag.topics or bag.topics["/truth"].count == 0:
         raise ConfigurationError(f"{bag.path}: has no truth to measure a run by")
-    truth = bag.arrays("/truth")
-    count = sum(key.endswith(".name") for key in truth)
-    return [str(truth[f"deputies.{index}.name"][0]) for index in range(count)]
+    _, first = next(bag.batches(["/truth"], 1))
+    count = sum(key.endswith(".name") for key in first)
+    return [str(first[f"deputies.{index}.name"][0]) for index in range(count)]
 
 
 def trajectory(bag: Bag, deputy: str) -> Trajectory:

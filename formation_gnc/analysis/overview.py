@@ -1,4 +1,4 @@
-"""One picture of a whole run."""
+"""A recorded run as pictures, for a README or a paper."""
 
 from pathlib import Path
 from typing import Any
@@ -7,50 +7,58 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from formation_gnc.analysis.metrics import Trajectory, deputies_of, trajectory
-from formation_gnc.recording.reader import Bag
+from formation_gnc.analysis.flown import AXES, Flown, FlownDeputy
 
-AXES = ("x radial", "y along-track", "z cross-track")
 COLOURS = ("tab:blue", "tab:orange", "tab:green")
-POINTS = 4000
-"""Points that a curve is drawn with at most."""
 
 
-def draw_overview(bag: Bag, path: Path, title: str) -> Path:
+def draw_overview(flown: Flown, path: Path, title: str) -> Path:
     """Draw four panels for every deputy: path, control error, estimation error with 3 sigma, thrust.
 
     Returns:
         The path of the PNG file.
     """
-    names = deputies_of(bag)
-    columns = 2 if len(names) == 1 else 4  # a fleet reads best with a row for each
-    rows = 4 * len(names) // columns
+    deputies = flown.deputies.values()
+    columns = 2 if len(deputies) == 1 else 4  # a fleet reads best with a row for each
+    rows = 4 * len(deputies) // columns
     figure = Figure(figsize=(5.5 * columns, 4.4 * rows + 0.4), layout="constrained", dpi=100)
     FigureCanvasAgg(figure)
     figure.suptitle(title)
-    panels = figure.subplots(rows, columns, squeeze=False).reshape(len(names), 4)
-    for row, name in zip(panels, names, strict=True):
-        flown = trajectory(bag, name)
-        _draw_path(row[0], flown, name)
-        _draw_error(row[1], flown)
-        _draw_estimation(row[2], flown)
-        _draw_thrust(row[3], flown)
+    panels = figure.subplots(rows, columns, squeeze=False).reshape(len(deputies), 4)
+    for row, deputy in zip(panels, deputies, strict=True):
+        for axes, draw in zip(row, PANELS.values(), strict=True):
+            draw(axes, deputy)
     figure.savefig(path)
     return path
 
 
-def _thin(count: int) -> slice:
-    return slice(None, None, max(1, count // POINTS))
+def draw_panels(flown: Flown, directory: Path) -> list[Path]:
+    """Draw each panel of the overview for itself, as `DEPUTY_PANEL.png`.
+
+    Returns:
+        The paths of the files.
+    """
+    paths = []
+    for deputy in flown.deputies.values():
+        for name, draw in PANELS.items():
+            figure = Figure(figsize=(6.0, 4.5), layout="constrained", dpi=150)
+            FigureCanvasAgg(figure)
+            draw(figure.subplots(), deputy)
+            paths.append(directory / f"{deputy.name}_{name}.png")
+            figure.savefig(paths[-1])
+    return paths
 
 
-def _draw_path(axes: Any, flown: Trajectory, name: str) -> None:
-    thin = _thin(len(flown.time))
-    axes.plot(flown.truth[thin, 1], flown.truth[thin, 0], color="tab:blue", lw=1.2, label="true path")
-    axes.plot(flown.target[thin, 1], flown.target[thin, 0], color="tab:red", lw=1.0, ls="--", label="target")
+def _draw_path(axes: Any, flown: FlownDeputy) -> None:
+    axes.plot(flown.truth[:, 1], flown.truth[:, 0], color="tab:blue", lw=1.2, label="true path")
+    axes.plot(flown.target[:, 1], flown.target[:, 0], color="tab:red", lw=1.0, ls="--", label="target")
     axes.plot(*flown.truth[0, [1, 0]], "o", color="tab:blue", ms=5, label="start")
-    axes.plot(*flown.target[-1, [1, 0]], "*", color="tab:red", ms=12, label="target at the end")
+    if len(flown.target):
+        axes.plot(*flown.target[-1, [1, 0]], "*", color="tab:red", ms=12, label="target at the end")
     axes.set(
-        xlabel="along-track y [m]", ylabel="radial x [m]", title=f"{name}: path in the chief's Hill frame"
+        xlabel="along-track y [m]",
+        ylabel="radial x [m]",
+        title=f"{flown.name}: path in the chief's Hill frame",
     )
     axes.axis("equal")
     axes.invert_xaxis()
@@ -58,25 +66,24 @@ def _draw_path(axes: Any, flown: Trajectory, name: str) -> None:
     axes.grid(alpha=0.3)
 
 
-def _draw_error(axes: Any, flown: Trajectory) -> None:
-    thin, hours = _thin(len(flown.time)), flown.time / 3600.0
+def _draw_error(axes: Any, flown: FlownDeputy) -> None:
+    hours, error = flown.control_time, flown.control[:, :3]
     for axis, (label, colour) in enumerate(zip(AXES, COLOURS, strict=True)):
-        axes.plot(hours[thin], np.abs(flown.error[thin, axis]), color=colour, lw=0.7, label=label)
-    distance = np.linalg.norm(flown.error[thin], axis=1)
-    axes.plot(hours[thin], distance, color="black", lw=1.5, label="distance")
+        axes.plot(hours, np.abs(error[:, axis]), color=colour, lw=0.7, label=label)
+    distance = np.linalg.norm(error, axis=1)
+    axes.plot(hours, distance, color="black", lw=1.5, label="distance")
     axes.set(xlabel="time [h]", ylabel="|true position - target| [m]", title="control error")
     axes.set_yscale("log")
-    axes.set_ylim(bottom=max(1e-3 * float(distance.max()), 1e-9))
+    axes.set_ylim(bottom=max(1e-3 * float(distance.max(initial=0.0)), 1e-9))
     axes.legend(loc="best", fontsize="small")
     axes.grid(alpha=0.3)
 
 
-def _draw_estimation(axes: Any, flown: Trajectory) -> None:
-    thin, hours = _thin(len(flown.time)), flown.time / 3600.0
+def _draw_estimation(axes: Any, flown: FlownDeputy) -> None:
     for axis, (label, colour) in enumerate(zip(AXES, COLOURS, strict=True)):
-        axes.plot(hours[thin], flown.estimation_error[thin, axis], color=colour, lw=1.0, label=label)
+        axes.plot(flown.error_time, flown.error[:, axis], color=colour, lw=1.0, label=label)
         for sign in (-3.0, 3.0):
-            axes.plot(hours[thin], sign * flown.sigma[thin, axis], color=colour, lw=0.8, ls=":")
+            axes.plot(flown.sigma_time, sign * flown.sigma[:, axis], color=colour, lw=0.8, ls=":")
     axes.set(
         xlabel="time [h]",
         ylabel="estimate - truth [m]",
@@ -86,16 +93,22 @@ def _draw_estimation(axes: Any, flown: Trajectory) -> None:
     axes.grid(alpha=0.3)
 
 
-def _draw_thrust(axes: Any, flown: Trajectory) -> None:
-    thin, hours = _thin(len(flown.applied_time)), flown.applied_time / 3600.0
+def _draw_thrust(axes: Any, flown: FlownDeputy) -> None:
     for axis, (label, colour) in enumerate(zip(AXES, COLOURS, strict=True)):
-        axes.plot(hours[thin], 1e6 * flown.applied[thin, axis], color=colour, lw=0.9, label=label)
+        axes.plot(flown.time, 1e6 * flown.acceleration[:, axis], color=colour, lw=0.9, label=label)
     axes.set(
         xlabel="time [h]", ylabel="acceleration by thrust [um/s^2]", title="thrust and delta-v (grey, right)"
     )
     spent = axes.twinx()
-    total = np.cumsum(np.abs(flown.applied).sum(axis=1)) * flown.tick
-    spent.plot(hours[thin], 1e3 * total[thin], color="grey", lw=1.5)
+    spent.plot(flown.time, 1e3 * flown.delta_v, color="grey", lw=1.5)
     spent.set(ylabel="delta-v [mm/s]")
     axes.legend(loc="best", fontsize="small")
     axes.grid(alpha=0.3)
+
+
+PANELS = {
+    "path": _draw_path,
+    "control": _draw_error,
+    "estimation": _draw_estimation,
+    "thrust": _draw_thrust,
+}

@@ -1,7 +1,7 @@
-"""Write a recorded run as one self-contained HTML page.
+"""Write a recorded run as one self-contained HTML page, and as pictures.
 
 The page works offline: trajectory with a time slider, errors with 3-sigma bounds, measurements and
-innovations, thrust, timing, events on every time axis, parameters and provenance.
+innovations, thrust, solver and timing, events on every time axis, parameters and provenance.
 """
 
 import argparse
@@ -17,18 +17,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--output", metavar="FILE", type=Path, help="page to write (default: report.html in the bag)"
     )
+    parser.add_argument(
+        "--pictures", metavar="DIR", type=Path, help="directory for PNG files, for a README or a paper"
+    )
 
 
 def run(options: argparse.Namespace) -> int:
     """Read, draw, write."""
+    from formation_gnc.analysis.flown import Flown
+    from formation_gnc.analysis.overview import draw_overview, draw_panels
     from formation_gnc.analysis.report import write_report
 
     bag = Bag(options.bag)
+    title = options.bag.absolute().name
     directory = options.bag if options.bag.is_dir() else options.bag.parent
-    path = options.output or directory / "report.html"
+    page = options.output or directory / "report.html"
+    flown = Flown(bag)
     try:
-        write_report(bag, path, options.bag.absolute().name)
+        write_report(bag, flown, page, title)
+        print(f"report: {page}")
+        if options.pictures is not None:
+            options.pictures.mkdir(parents=True, exist_ok=True)
+            overview = draw_overview(flown, options.pictures / "overview.png", title)
+            for picture in [overview, *draw_panels(flown, options.pictures)]:
+                print(f"picture: {picture}")
     except OSError as error:
-        raise ConfigurationError(f"report {path}: {error.strerror or error}") from None
-    print(f"report: {path}")
+        raise ConfigurationError(f"report {error.filename}: {error.strerror or error}") from None
     return 0

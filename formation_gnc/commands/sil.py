@@ -185,6 +185,7 @@ def _fly_in_process(scenario: Scenario, bag: Path, console: Console) -> float:
 
 
 def _summarise(scenario: Scenario, bag: Path, speedup: float, as_json: bool) -> int:
+    from formation_gnc.analysis.flown import Flown
     from formation_gnc.analysis.metrics import figures
     from formation_gnc.analysis.overview import draw_overview
     from formation_gnc.analysis.separation import nearest_approach
@@ -192,7 +193,7 @@ def _summarise(scenario: Scenario, bag: Path, speedup: float, as_json: bool) -> 
 
     recorded = Bag(bag)
     result, nearest = figures(recorded), nearest_approach(recorded)
-    picture = draw_overview(recorded, bag / "overview.png", scenario.name)
+    picture = draw_overview(Flown(recorded), bag / "overview.png", scenario.name)
     if as_json:
         summary = {
             "scenario": scenario.name,

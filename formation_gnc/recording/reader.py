@@ -3,7 +3,7 @@
 import heapq
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import groupby, islice, zip_longest
+from itertools import groupby, zip_longest
 from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -113,11 +113,23 @@ class Bag:
         """
         return self._as_arrays(topic, [(data, stamp) for _, data, stamp in self.messages([topic])])
 
-    def batches(self, topic: str, size: int = 8192) -> Iterator[dict[str, NDArray[Any]]]:
-        """All messages of a topic as `arrays` has them, so many at a time: for bags of any length."""
-        rows = ((data, stamp) for _, data, stamp in self.messages([topic]))
-        while batch := list(islice(rows, size)):
-            yield self._as_arrays(topic, batch)
+    def batches(
+        self, topics: Sequence[str], size: int = 1024
+    ) -> Iterator[tuple[str, dict[str, NDArray[Any]]]]:
+        """Messages as (topic, `arrays` of some of them), in one reading, for bags of any length.
+
+        Each topic's come in recorded order, `size` at a time.
+        """
+        waiting: dict[str, list[tuple[bytes, int]]] = {topic: [] for topic in topics}
+        for topic, data, stamp in self.messages(topics):
+            rows = waiting[topic]
+            rows.append((data, stamp))
+            if len(rows) == size:
+                waiting[topic] = []
+                yield topic, self._as_arrays(topic, rows)
+        for topic, rows in waiting.items():
+            if rows:
+                yield topic, self._as_arrays(topic, rows)
 
     def _as_arrays(self, topic: str, rows: list[tuple[bytes, int]]) -> dict[str, NDArray[Any]]:
         stamps = np.array([stamp for _, stamp in rows], dtype=np.int64)
