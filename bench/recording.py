@@ -33,7 +33,7 @@ Message = tuple[str, bytes, int]
 Definitions = dict[str, TopicDefinition]
 
 REPORT = """
-import resource, sys
+import re, sys
 from pathlib import Path
 from time import perf_counter
 from formation_gnc.analysis.flown import Flown
@@ -43,7 +43,9 @@ from formation_gnc.recording.reader import Bag
 started = perf_counter()
 bag = Bag(sys.argv[1])
 write_report(bag, Flown(bag), Path(sys.argv[1]) / "report.html", "bench")
-print(perf_counter() - started, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+# not ru_maxrss, which begins at that of the process before exec
+peak = int(re.search(r"VmHWM:\\s+(\\d+) kB", Path("/proc/self/status").read_text())[1])
+print(perf_counter() - started, peak / 1024)
 """
 
 

@@ -42,9 +42,9 @@ def test_a_short_run_is_all_there(bag: Bag, flown: Flown) -> None:
         assert np.array_equal(deputy.acceleration[1:], read.applied)
         # another order of adding up
         assert deputy.spent == pytest.approx(whole.deputies[name].delta_v_m_s, rel=1e-12)
-        assert {sensor: len(rows) for sensor, rows in deputy.readings.items()} == {
-            sensor: 25 for sensor in deputy.readings
-        }
+        assert {sensor: len(rows) for sensor, rows in deputy.readings.items()} == dict.fromkeys(
+            deputy.readings, 25
+        )
     assert flown.nearest == nearest_approach(bag)
     assert len(flown.distances) == 6
     assert min(rows[:, 1].min() for rows in flown.distances.values()) == flown.nearest.distance
