@@ -208,6 +208,17 @@ class FiniteHorizonController(Controller):
         A plan that cannot be made says why in its `failure`; errors of arithmetic may be raised.
         """
 
+    def figures(self) -> dict[str, Any]:
+        """The schedule of plans, and the law that holds."""
+        parameters = self._parameters
+        interval = max(parameters.replan_interval, self._tick)
+        later = max(0.0, parameters.final_time - parameters.last_plan) / interval
+        return {
+            "steps of the first plan": math.ceil(parameters.final_time / parameters.step),
+            "plans in a reconfiguration": max(1, math.ceil(later)),
+            **self.holding.figures(),
+        }
+
     def take_over(self, handover: Handover) -> None:
         """Go on with the reconfiguration of a law of the same kind."""
         if isinstance(handover.law, type(self)):

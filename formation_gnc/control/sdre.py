@@ -1,6 +1,7 @@
 """Infinite-time state-dependent Riccati equation."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -15,7 +16,7 @@ from formation_gnc.control.weights import QuadraticWeights
 from formation_gnc.errors import ConfigurationError, DesignError
 from formation_gnc.interface import NANOSECONDS, Estimate, Matrix, Target, Vector
 from formation_gnc.mission import Mission
-from formation_gnc.orbit.elements import elements_from_state
+from formation_gnc.orbit.elements import Elements, elements_from_state
 from formation_gnc.parameters import parameter
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.model import INPUT
@@ -82,7 +83,8 @@ class Sdre(Controller):
             DesignError: inadmissible weights.
         """
         self._parameters = parameters
-        self._tick, self._limit = mission.tick, vehicle.thrust_limit
+        self._tick, self._limit, self._mass = mission.tick, vehicle.thrust_limit, vehicle.mass
+        self._chief = mission.chief
         self._integrates = parameters.integral_error > 0.0
         self._integral = np.zeros(3)
         self._gain: Matrix | DesignError = DesignError("none yet")
@@ -97,6 +99,13 @@ class Sdre(Controller):
             raise DesignError(f"sdre: {error}") from error
         self.reserve = LinearQuadraticRegulator(LqrParameters(**parameters.weights()), mission, vehicle)
         self._feed_forward = FeedForward(parameters.feed_forward, HillModel(mission.mean_motion))
+
+    def figures(self) -> dict[str, Any]:
+        """The gain on force for a deputy at the chief, where the chief is at the start."""
+        model = PLAN_MODELS[self._parameters.model](Elements(**vars(self._chief)))
+        system = state_dependent(model, self._parameters.factorisation, np.zeros(1))
+        gain = self.gain(system(np.zeros((1, 6)))[0][0])
+        return {"gain at the chief, at the start [N/m, N/(m/s), N/(m s)]": (self._mass * gain).tolist()}
 
     def take_over(self, handover: Handover) -> None:
         """Keep the integral of an SDRE that flew before."""

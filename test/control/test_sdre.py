@@ -156,6 +156,18 @@ def test_a_reconfiguration_arrives_in_time_and_is_held(law, parameters, estimate
     assert off[-1] < 2.0
 
 
+def test_a_design_tells_its_gain_and_its_schedule(mission, vehicle):
+    sdre = Sdre(SdreParameters(model="nonlinear", **WEIGHTS), mission, vehicle).figures()
+    lqr = LinearQuadraticRegulator(LqrParameters(**WEIGHTS), mission, vehicle).figures()
+    (gain,) = sdre.values()
+    expected = np.array(lqr["gain [N/m, N/(m/s), N/(m s)]"])
+    np.testing.assert_allclose(gain, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+    parameters = AsreParameters(final_time=2000.0, step=30.0, replan_interval=300.0, last_plan=500.0)
+    figures = Asre(parameters, mission, vehicle).figures()
+    assert figures["steps of the first plan"] == 67
+    assert figures["plans in a reconfiguration"] == 5  # at 0, 300 ... 1200 s
+
+
 def test_a_plan_is_a_pure_function_of_its_task(mission):
     model = NonlinearModel(KeplerChief.of(CHIEF))
     task = Task(model, 0.0, np.array([300.0, 700, 300, 0.2, -0.4, 0.2]), np.zeros(6), 1000.0, 20)
