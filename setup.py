@@ -3,7 +3,7 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 NAME = "formation_gnc"
-NODES = ["plant", "navigation", "guidance", "controller", "satellite", "recorder", "replay"]
+NODES = ["plant", "navigation", "guidance", "controller", "satellite", "display", "recorder", "replay"]
 
 setup(
     name=NAME,

@@ -25,6 +25,10 @@ class Orbit:
     true_anomaly: float = parameter(0.0, unit="rad", doc="true anomaly")
 
 
+ANY_ORBIT = Orbit(7e6)
+"""For nodes that do not depend on the chief, of which every scenario's file tells all."""
+
+
 @dataclass(frozen=True)
 class Mission:
     """Base of every node's schema; in a scenario file it stands once, under ``/**``."""

@@ -9,6 +9,7 @@ from formation_gnc.control.autopilot import ControllerParameters
 from formation_gnc.guidance.guide import GuidanceParameters
 from formation_gnc.mission import Mission
 from formation_gnc.navigation.navigator import NavigationParameters
+from formation_gnc.nodes.display import DisplayParameters
 from formation_gnc.nodes.recorder import RecorderParameters
 from formation_gnc.nodes.replay import ReplayParameters
 from formation_gnc.parameters import Leaf, leaves
@@ -24,6 +25,7 @@ SCHEMAS: dict[str, Any] = {
     "guidance": GuidanceParameters,
     "controller": ControllerParameters,
     "recorder": RecorderParameters,
+    "display": DisplayParameters,
     "replay": ReplayParameters,
 }
 """Schema of each node."""

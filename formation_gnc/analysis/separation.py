@@ -45,3 +45,24 @@ def nearest_approach(bag: Bag) -> Separation | None:
     names, truth = deputies_of(bag), bag.arrays("/truth")
     positions = [truth[f"deputies.{index}.relative_state"][:, :3] for index in range(len(names))]
     return minimum_separation(truth["time"], np.array(positions), names)
+
+
+def predicted_approach(bag: Bag, kind: str) -> Separation | None:
+    """Nearest approach that guidance foresaw in a recorded run; none when it looked for none.
+
+    Args:
+        bag: of the run.
+        kind: "planned" or "passive", as in Separation.msg.
+    """
+    nearest: Separation | None = None
+    for name in deputies_of(bag):
+        topic = f"/{name}/separation"
+        if topic not in bag.topics or not bag.topics[topic].count:
+            continue
+        foreseen = bag.arrays(topic)
+        index = int(foreseen[kind].argmin())
+        distance = float(foreseen[kind][index])
+        if nearest is None or distance < nearest.distance:
+            when, other = float(foreseen[f"{kind}_time"][index]), str(foreseen[f"{kind}_other"][index])
+            nearest = Separation(distance, when, (name, other))
+    return nearest

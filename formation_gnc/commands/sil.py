@@ -51,6 +51,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--bag", metavar="DIR", type=Path, help="directory to make for the bag (default: bags/SCENARIO_DATE)"
     )
+    parser.add_argument(
+        "--display", action="store_true", help="draw the run as markers and transforms, for RViz or Foxglove"
+    )
     parser.add_argument("--json", action="store_true", help="print the figures as one JSON object")
 
 
@@ -61,9 +64,9 @@ def run(options: argparse.Namespace) -> int:
     if bag.exists():
         raise ConfigurationError(f"bag {bag}: exists already; name a directory that does not")
     console = Console(stderr=True, highlight=False)
-    fly = _fly_in_process if options.in_process else partial(_fly_on_graph, composed=options.composed)
+    on_graph = partial(_fly_on_graph, composed=options.composed, display=options.display)
     try:
-        speedup = fly(scenario, bag, console)
+        speedup = (_fly_in_process if options.in_process else on_graph)(scenario, bag, console)
     except KeyboardInterrupt:
         print(f"formation-gnc: interrupted; {_closed(bag)}", file=sys.stderr)
         return 130
@@ -138,16 +141,16 @@ class _Display:
             self.say(message)
 
 
-def _fly_on_graph(scenario: Scenario, bag: Path, console: Console, composed: bool) -> float:
+def _fly_on_graph(scenario: Scenario, bag: Path, console: Console, composed: bool, display: bool) -> float:
     from formation_gnc.nodes.launcher import Report, fly_graph
 
     Run(scenario)  # what cannot be flown is refused before anything starts
 
     def show(report: Report) -> None:
-        display.show(report.message, report.figures.get("tick", 0.0), report.figures.get("speedup", 0.0))
+        shown.show(report.message, report.figures.get("tick", 0.0), report.figures.get("speedup", 0.0))
 
-    with _Display(console, scenario.plant.ticks) as display:
-        last = fly_graph(scenario, bag.absolute(), show, display.say, composed)
+    with _Display(console, scenario.plant.ticks) as shown:
+        last = fly_graph(scenario, bag.absolute(), show, shown.say, composed, display)
         return last.figures.get("speedup", 0.0)
 
 
@@ -188,11 +191,16 @@ def _summarise(scenario: Scenario, bag: Path, speedup: float, as_json: bool) -> 
     from formation_gnc.analysis.flown import Flown
     from formation_gnc.analysis.metrics import figures
     from formation_gnc.analysis.overview import draw_overview
-    from formation_gnc.analysis.separation import nearest_approach
+    from formation_gnc.analysis.separation import nearest_approach, predicted_approach
     from formation_gnc.recording.reader import Bag
 
     recorded = Bag(bag)
-    result, nearest = figures(recorded), nearest_approach(recorded)
+    result = figures(recorded)
+    separations = {
+        "minimum separation": nearest_approach(recorded),
+        "least predicted on target": predicted_approach(recorded, "planned"),
+        "least predicted without thrust": predicted_approach(recorded, "passive"),
+    }
     picture = draw_overview(Flown(recorded), bag / "overview.png", scenario.name)
     if as_json:
         summary = {
@@ -206,8 +214,10 @@ def _summarise(scenario: Scenario, bag: Path, speedup: float, as_json: bool) -> 
             "picture": str(picture),
             "deputies": {name: dataclasses.asdict(each) for name, each in result.deputies.items()},
         }
-        if nearest is not None:
-            summary["minimum_separation_m"] = nearest.distance
+        names = ("minimum_separation_m", "planned_separation_m", "passive_separation_m")
+        for name, each in zip(names, separations.values(), strict=True):
+            if each is not None:
+                summary[name] = each.distance
         print(json.dumps(summary, indent=2))
         return 0
     table = Table(title=f"{scenario.name}, seed {scenario.plant.seed}", title_justify="left")
@@ -231,9 +241,9 @@ def _summarise(scenario: Scenario, bag: Path, speedup: float, as_json: bool) -> 
     console.print(table)
     lost = f", {recorded.lost} messages not recorded" if recorded.lost else ""
     console.print(f"{result.ticks} ticks, {result.misses} missed{lost}, {speedup:,.0f} x real time")
-    if nearest is not None:
-        console.print(
-            f"minimum separation {nearest.distance:.1f} m, {' and '.join(nearest.pair)} at {nearest.time:g} s"
-        )
+    for label, separation in separations.items():
+        if separation is not None:
+            pair = " and ".join(separation.pair)
+            console.print(f"{label}: {separation.distance:.1f} m, {pair} at {separation.time:.0f} s")
     console.print(f"bag: {bag}\npicture: {picture}", soft_wrap=True)
     return 0

@@ -28,6 +28,9 @@ PR_SET_PDEATHSIG = 1  # from <linux/prctl.h>
 GRACE = 2.0
 """Wall time (s) that nodes have to stop when asked; whoever is left then is killed."""
 
+TIME_TO_CLOSE = 10.0
+"""Wall time (s) that the recorder has to close its bag, which takes long on a busy machine."""
+
 LAST_WORD = 1.0
 """Wall time (s) after the plant's end in which its last report is waited for."""
 
@@ -105,7 +108,7 @@ class Graph:
         for kind in (False, True):
             group = [node for node in self.nodes if node.name.endswith("/recorder") is kind]
             _signal(group, signal.SIGINT)
-            _wait(group, GRACE / 2 if not kind else GRACE)
+            _wait(group, GRACE / 2 if not kind else TIME_TO_CLOSE)
             _signal(group, signal.SIGKILL)
         _wait(self.nodes, GRACE)
 
@@ -185,6 +188,7 @@ def fly_graph(
     show: Callable[[Report], None],
     announce: Callable[[str], None],
     composed: bool = False,
+    display: bool = False,
 ) -> Report:
     """Fly a scenario on the node graph.
 
@@ -194,6 +198,7 @@ def fly_graph(
         show: called with the run's progress as it is reported.
         announce: called once with a line that says where the graph can be watched.
         composed: one process for each satellite, not one for each of its nodes.
+        display: start the display node too.
 
     Returns:
         The last report of the plant.
@@ -226,6 +231,8 @@ def fly_graph(
             for deputy in scenario.plant.deputies:
                 for process in ("satellite",) if composed else topics.PARTS:
                     graph.start(f"/{deputy}/{process}", arguments)
+            if display:
+                graph.start("/display", arguments)
             with _listener(domain, hear) as listen:
                 while plant_process.process.poll() is None:
                     listen(0.1)

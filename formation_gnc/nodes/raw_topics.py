@@ -57,7 +57,7 @@ class RawTopics:
         stamped = is_clock or "std_msgs/Header" in list(kind.get_fields_and_field_types().values())[:1]
 
         def receive(data: bytes, about: dict[str, Any]) -> None:
-            stamp = _first_stamp(data) if stamped else self._time
+            stamp = first_stamp(data) if stamped else self._time
             if stamp < 0:  # of somebody else's making: ours has no time before 0
                 stamp = self._time
             if is_clock:
@@ -78,7 +78,7 @@ def _as_executor_calls(receive: Callable[[bytes, dict[str, Any]], None]) -> Call
     return take
 
 
-def _first_stamp(data: bytes) -> int:
+def first_stamp(data: bytes) -> int:
     """The stamp that a message begins with, in ns: after four bytes that tell how it is encoded."""
     seconds, nanoseconds = struct.unpack_from("<iI", data, 4)
     return int(seconds * NANOSECONDS + nanoseconds)

@@ -11,7 +11,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.interface import NANOSECONDS
-from formation_gnc.mission import Mission, Orbit
+from formation_gnc.mission import ANY_ORBIT, Mission, Orbit
 from formation_gnc.nodes import topics
 from formation_gnc.nodes.conversion import message_class, stamp
 from formation_gnc.nodes.shell import ConfiguredNode, asked_to_stop, run
@@ -23,9 +23,6 @@ BURST = 50
 
 CHECK_PERIOD = 0.002
 """Wall time (s) between looks at pace and patience."""
-
-ANY_ORBIT = Orbit(7e6)
-"""Every scenario's file tells every node of the chief; nothing here depends on it."""
 
 
 @dataclass(frozen=True)

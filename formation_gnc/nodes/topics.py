@@ -12,6 +12,8 @@ CLOCK = "/clock"
 TRUTH = "/truth"
 EVENTS = "/events"
 DIAGNOSTICS = "/diagnostics"
+MARKERS = "/markers"
+TRANSFORMS = "/transforms"
 RECORDED = "/recorder/progress"
 """Stamp up to which the recorder has everything."""
 

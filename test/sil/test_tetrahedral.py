@@ -93,3 +93,17 @@ def test_a_fleet_flies_the_same_bits_on_the_graph_composed_in_process_and_again(
     ]
     assert sorted(places) == ["0", "1", "2", "3"]
     assert graph.arrays("/deputy1/target")["others"].shape == (120, 18)
+
+
+@pytest.mark.sil
+def test_the_display_draws_the_fleet_while_it_flies(sil: Callable[..., Sil]) -> None:
+    run = sil(
+        "--composed", "--display", "--duration", "900", "--real-time-factor", "200", scenario="tetrahedral"
+    )
+    status, _, errors = run.finish()
+    assert status == 0, errors
+    drawn = Bag(run.bag)
+    assert drawn.topics["/markers"].type_name == "visualization_msgs/msg/MarkerArray"
+    assert drawn.topics["/markers"].count > 5
+    transforms = drawn.topics.get("/tf") or drawn.topics["/transforms"]
+    assert transforms.count >= drawn.topics["/markers"].count
