@@ -9,11 +9,12 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from bench import control, dynamics, graph, navigation, recording
+from bench import control, dynamics, fleet, graph, navigation, recording
 from bench.result import Result
 
 BENCHMARKS = {
     "graph": graph.run,
+    "fleet": fleet.run,
     "dynamics": dynamics.run,
     "navigation": navigation.run,
     "control": control.run,
