@@ -11,17 +11,22 @@ import piqp
 from numpy.typing import NDArray
 
 from bench.result import Result
+from formation_gnc.control.adaptive_lqr import AdaptiveLinearQuadraticRegulator, AdaptiveLqrParameters
 from formation_gnc.control.controller import Controller, Vehicle
+from formation_gnc.control.gmpsp import GmpspController
 from formation_gnc.control.hinf import HInfinityController, HinfParameters
 from formation_gnc.control.lqr import LinearQuadraticRegulator, LqrParameters
 from formation_gnc.control.mpc import SETTINGS, ModelPredictiveController, MpcParameters
+from formation_gnc.control.mpsp import MpspController
 from formation_gnc.interface import NANOSECONDS, Estimate, Target
 from formation_gnc.mission import Mission, Orbit
+from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.relative.hill import HillModel
 
 TICKS = 3000
 MISSION = Mission(Orbit(6978100.0), tick=1.0)
 VEHICLE = Vehicle(100.0, np.full(3, 0.01))
+CHIEF = state_from_elements(Elements(**vars(MISSION.chief)))
 START = np.array([40.0, -30.0, 20.0, 0.0, 0.0, 0.0])
 BRYSON: dict[str, Any] = {
     "position_error": (10.0,) * 3,
@@ -38,9 +43,7 @@ def fly(law: Controller, start: NDArray[np.float64] = START) -> NDArray[np.float
     nowhere = np.empty((0, 6))
     for tick in range(TICKS):
         time = tick * NANOSECONDS
-        seen = Estimate(
-            time, state + noise[tick], np.zeros((6, 6)), np.zeros(6), 100.0, False, [], [], [], 0.0, 0
-        )
+        seen = Estimate(time, state + noise[tick], np.zeros((6, 6)), CHIEF, 100.0, False, [], [], [], 0.0, 0)
         aim = Target(time, "", np.zeros(6), 60.0, nowhere)
         started = thread_time()
         force = law.command(seen, aim).force
@@ -68,6 +71,20 @@ def programmes() -> tuple[NDArray[np.float64], list[dict[str, Any]], tuple[Any, 
     fly(law)
     plain = ModelPredictiveController(MpcParameters(**BRYSON), MISSION, VEHICLE)
     return fly(plain), asked, law.matrices
+
+
+def plan_time(law: type[Controller]) -> float:
+    """Median compute time of a first command, s of this thread: a plan over 100 steps with J2."""
+    times = []
+    for _ in range(10):
+        flying = law(law.Parameters(**BRYSON), MISSION, VEHICLE)
+        seen = Estimate(0, START / 10.0, np.zeros((6, 6)), CHIEF, 100.0, False, [], [], [], 0.0, 0)
+        started = thread_time()
+        answer = flying.command(seen, Target(0, "", np.zeros(6), 60.0, np.empty((0, 6))))
+        times.append(thread_time() - started)
+        if answer.solver != "planned":
+            raise RuntimeError(f"{law.__name__}: {answer.fallback}")
+    return float(np.median(times))
 
 
 def solve_all(asked: list[dict[str, Any]], solve: Callable[[dict[str, Any]], Any]) -> NDArray[np.float64]:
@@ -140,7 +157,22 @@ def run() -> list[Result]:
         "H-infinity, full information": HInfinityController(
             HinfParameters(form="full_information"), MISSION, VEHICLE
         ),
+        "MPSP": MpspController(MpspController.Parameters(**BRYSON), MISSION, VEHICLE),
+        "G-MPSP": GmpspController(GmpspController.Parameters(**BRYSON), MISSION, VEHICLE),
+        "Adaptive LQR": AdaptiveLinearQuadraticRegulator(AdaptiveLqrParameters(**BRYSON), MISSION, VEHICLE),
     }.items():
         taken = float(np.median(fly(law, near))) * micro
         results.append(Result(f"{label} tick against MPC's", taken, median, "us", taken / median, ""))
+    for label, planner in {"MPSP": MpspController, "G-MPSP": GmpspController}.items():
+        taken = plan_time(planner)
+        results.append(
+            Result(
+                f"{label} plan, 100 steps, against a tick",
+                1e3 * taken,
+                1e3,
+                "ms",
+                taken / MISSION.tick,
+                "<= 1",
+            )
+        )
     return results

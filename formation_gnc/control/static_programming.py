@@ -46,7 +46,7 @@ def mpsp(task: Task, tolerance: Vector, most_iterations: int = 20, method: str =
     """MPSP: Joshi (6.1)-(6.11), from the task's guess or no thrust.
 
     The sensitivities are the exact derivatives of the step that predicts, "rk4" or "euler" (6.14); Joshi
-    predicts with the one and differentiates the other, which at his step of 1 s is the same to 10^-3.
+    predicts with the one and differentiates the other, which at his step of 1 s is nearly the same.
 
     Args:
         task: its steps are those of the discrete model.
