@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -80,7 +81,7 @@ class AdaptiveLinearQuadraticRegulator(Controller):
             )
         model, orbit = HillModel(mission.mean_motion), mission.chief
         self._tick = mission.tick
-        self._limit = vehicle.thrust_limit
+        self._limit, self._mass = vehicle.thrust_limit, vehicle.mass
         self._rate, self._latitude = model.mean_motion, orbit.argument_of_perigee + orbit.true_anomaly
         self._radius = orbit.semi_major_axis / parameters.reach
         try:
@@ -103,6 +104,16 @@ class AdaptiveLinearQuadraticRegulator(Controller):
         )
         self._target: Target | None = None
         self._failure = ""
+
+    def figures(self) -> dict[str, Any]:
+        """The gain on force that the law starts with, and how much it has to learn."""
+        columns = [self._regulator.thrust(error, np.zeros(6)) for error in np.diag(1.0 / self._state_unit)]
+        gain = -self._mass * self._input_unit[:, None] * np.transpose(columns)
+        networks = (self.networks.model_weights, self.networks.costate_weights)
+        return {
+            "gain at the start [N/m, N/(m/s)]": gain.tolist(),
+            "network weights": sum(each.size for each in networks),
+        }
 
     def take_over(self, handover: Handover) -> None:
         """Go on with what a law of the same kind and reach has learnt."""

@@ -54,6 +54,8 @@ def test_the_law_starts_as_lqr(law, mission, vehicle, estimate, target):
     state = np.array([10.0, -20.0, 5.0, 0.01, 0.0, -0.02])
     plain = LinearQuadraticRegulator(LqrParameters(gain="continuous", **ROBERTS), mission, vehicle)
     force = law().command(estimate(state), target()).force
+    gain = np.array(law().figures()["gain at the start [N/m, N/(m/s)]"])
+    np.testing.assert_allclose(-gain @ state, force, rtol=1e-9)
     np.testing.assert_allclose(force, plain.command(estimate(state), target()).force, rtol=1e-9)
 
 
