@@ -1,0 +1,86 @@
+"""What holds for every law in the registry, whatever comes in."""
+
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from formation_gnc.control.autopilot import Autopilot, ControllerParameters
+from formation_gnc.control.registry import ALGORITHMS
+from formation_gnc.orbit.elements import Elements, state_from_elements
+from formation_gnc.parameters import load
+
+CHIEF = state_from_elements(Elements(6978100.0, 0.0, 1.48, 0.0, 0.0, 0.0))
+LIMIT = np.array([0.01, 0.02, 0.0])
+"""N; and one axis that cannot push."""
+
+
+def autopilot(algorithm: str, **values: Any) -> Autopilot:
+    basis = {"chief.semi_major_axis": 6978100.0, "tick": 10.0, "thrust_limit": tuple(LIMIT)}
+    own = {key.replace("__", "."): value for key, value in values.items()}
+    if "final_time" in {field.name for field in fields(ALGORITHMS[algorithm].Parameters)}:
+        own[f"{algorithm}.final_time"] = 300.0  # short plans are soon made
+    return Autopilot("controller", load(ControllerParameters, {"algorithm": algorithm} | basis | own))
+
+
+def arrays(shape: Any, size: float) -> st.SearchStrategy[Any]:
+    """Arrays as they come in flight, and such as no flight has."""
+    sane = hnp.arrays(float, shape, elements=st.floats(-size, size))
+    return sane | hnp.arrays(float, shape, elements=st.floats(allow_nan=True, allow_infinity=True))
+
+
+@st.composite
+def ticks(draw: Any) -> dict[str, Any]:
+    """What comes in at a tick."""
+    eclipse = draw(arrays((draw(st.integers(0, 2)), 2), 1e4))
+    return {
+        "state": draw(arrays(6, 1e3)),
+        "mass": draw(st.just(100.0) | st.floats(allow_nan=True, allow_infinity=True)),
+        "chief": draw(st.just(CHIEF) | arrays(6, 1e7)),
+        "goal": draw(arrays(6, 1e3)),
+        "preview": draw(arrays((draw(st.integers(0, 3)), 6), 1e3)),
+        "eclipse": eclipse,
+        "others": draw(arrays((draw(st.integers(0, 2)), 6), 1e3)),
+    }
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+@settings(deadline=None, max_examples=12)
+@given(flight=st.lists(ticks(), min_size=1, max_size=4))
+def test_a_command_is_never_nan_and_never_above_the_limit(algorithm, flight, estimate, target):
+    pilot = autopilot(algorithm, mpc__keep_out_radius=20.0, mpc__off_in_eclipse=True, mpc__horizon=40)
+    for tick, each in enumerate(flight):
+        seen = estimate(each["state"], 10.0 * tick, each["mass"], each["chief"])
+        aim = target(
+            each["goal"],
+            10.0 * tick,
+            each["preview"],
+            eclipse=each["eclipse"],
+            others=each["others"],
+        )
+        thrust, status = pilot.on_tick(seen, aim)
+        assert np.isfinite(thrust.force).all()
+        assert (np.abs(thrust.force) <= LIMIT).all()
+        assert np.isfinite(status.demand).all()
+        if not np.isfinite(each["state"]).all():
+            assert not thrust.force.any()
+            assert status.fallback == "estimate not finite: no thrust"
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_after_whatever_came_in_the_law_flies_on(algorithm, estimate, target):
+    pilot, state = autopilot(algorithm), np.array([5.0, -8.0, 0.0, 0.0, 0.0, 0.0])
+    bad = [np.full(6, np.nan), np.full(6, np.inf), np.full(6, 1e200), np.full(6, 1e15)]
+    for tick, wrong in enumerate([*bad, *[state] * 20]):
+        thrust, _ = pilot.on_tick(estimate(wrong, 10.0 * tick, chief=CHIEF), target(time=10.0 * tick))
+    assert thrust.force.any() == (algorithm != "coast")
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_no_thrust_limit_at_all_is_refused(algorithm):
+    with pytest.raises(ValueError, match=r"thrust_limit: .* is not allowed; one axis must push"):
+        autopilot(algorithm, thrust_limit=(0.0, 0.0, 0.0))
