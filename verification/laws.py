@@ -112,8 +112,9 @@ class Row:
     @property
     def line(self) -> str:
         """Line of a Markdown table."""
-        figures = [f"{value:.3g}" for value in astuple(self)[3:]]
-        return f"| {self.law} | {self.knows} | " + " | ".join(figures) + " |"
+        figures = [f"{value:.3g}" for value in astuple(self)[3:-1]]
+        compute = round(self.compute, 1 - len(str(int(self.compute))))  # a digit, lest no page equals another
+        return f"| {self.law} | {self.knows} | " + " | ".join(figures) + f" | {compute:g} |"
 
     def moved(self, expected: "Row | None") -> list[Figure]:
         """Its figures with the tolerances that follow from those that are expected."""

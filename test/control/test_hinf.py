@@ -182,6 +182,7 @@ def test_the_same_parameters_give_the_same_law():
     ("changes", "message"),
     [
         ({"pole_shift": 0.0, "disturbance": 0.0}, "poles on the imaginary axis"),
+        ({"thrust": (1e12,) * 3}, r"no controller at any gamma for these weights \(none up to gamma"),
         ({"form": "full_information", "disturbance": 0.0}, "needs a disturbance"),
         ({"bandwidth": (0.5, 0.5, 0.5), "thrust": (1e5, 1e5, 1e5)}, "once a tick is not stable"),
     ],

@@ -233,6 +233,41 @@ def test_a_scheduled_swap_takes_over_at_its_tick_and_no_command_is_missed() -> N
     assert not forces(records)[-1].any()
 
 
+def test_mpc_gives_no_thrust_in_an_eclipse_that_guidance_foresees() -> None:
+    mpc = {"algorithm": "mpc", "mpc.off_in_eclipse": True, "mpc.horizon": 45}
+    _, records = fly({"/**": {"tick": 10.0}, "/**/controller": mpc}, ticks=1200)
+    dark = column(records["/truth"], lambda truth: truth.deputies[0].eclipse)
+    assert 230 < dark.sum() < 250, "two eclipses of 20 minutes"
+    assert not forces(records)[dark].any()
+    assert np.abs(forces(records)).max() > 0.002
+    target = column(records["/deputy1/target"], lambda target: target.relative_state)
+    # measured: 0.4 m, on estimates good to as much
+    assert np.linalg.norm((true_states(records) - target)[-1, :3]) < 1.5
+
+
+@pytest.mark.parametrize(("radius", "least", "most"), [(0.0, 30.0, 45.0), (60.0, 58.0, 70.0)])
+def test_mpc_keeps_out_of_the_way_of_the_others_of_its_fleet(
+    radius: float, least: float, most: float
+) -> None:
+    # They start 10 m from one another's places, and change over.
+    scenario: Overrides = {
+        "/**": {"tick": 10.0},
+        "/plant": {
+            "deputies": ["deputy1", "deputy2"],
+            "deputy1.relative_state": [0.0, -190.0, 0.0, 0.0, 0.0, 0.0],
+            "deputy2.relative_state": [0.0, -110.0, 0.0, 0.0, 0.0, 0.0],
+        },
+        "/*/guidance": {"fleet": ["deputy1", "deputy2"]},
+        "/deputy2/guidance": {"slot": 1},
+        "/*/controller": {"algorithm": "mpc", "mpc.keep_out_radius": radius},
+    }
+    _, records = fly(scenario, ticks=600)
+    both = column(records["/truth"], lambda truth: [deputy.relative_state[:3] for deputy in truth.deputies])
+    assert least < np.linalg.norm(both[:, 0] - both[:, 1], axis=1).min() < most
+    assert np.linalg.norm(both[-1] - [[0.0, -100.0, 0.0], [0.0, -200.0, 0.0]], axis=1).max() < 3.0
+    assert not [event for event in records["/events"] if event.kind == "fallback"]
+
+
 def test_a_deputy_without_an_estimate_misses_its_ticks_and_comes_back_with_a_fix(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
