@@ -128,5 +128,6 @@ def figures(bag: Bag) -> RunFigures:
             delta_v_m_s=float(flown.delta_v.sum()),
             delta_v_axes_m_s=flown.delta_v.tolist(),
         )
-    kinds = bag.arrays("/events")["kind"] if "/events" in bag.topics else np.array([])
-    return RunFigures(bag.topics["/truth"].count, int(np.count_nonzero(kinds == "miss")), deputies)
+    has_events = "/events" in bag.topics and bag.topics["/events"].count > 0
+    misses = np.count_nonzero(bag.arrays("/events")["kind"] == "miss") if has_events else 0
+    return RunFigures(bag.topics["/truth"].count, int(misses), deputies)

@@ -7,6 +7,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
 
 from formation_gnc import interface
+from formation_gnc.errors import ConfigurationError
 from formation_gnc.interface import NANOSECONDS
 from formation_gnc.nodes import topics
 from formation_gnc.nodes.conversion import from_message, message_type, to_message
@@ -60,10 +61,21 @@ class InProcessRecorder:
 
 
 def reader(bag: Bag) -> Callable[[str, bytes], Any]:
-    """A function that gives the record which a message of the bag carries, by its topic and CDR bytes."""
+    """A function that gives the record which a message of the bag carries, by its topic and CDR bytes.
+
+    It raises ConfigurationError for a message that is not laid out as the installed type is.
+    """
+
+    records: dict[str, Any] = {}
 
     def read(topic: str, data: bytes) -> Any:
-        record = getattr(interface, bag.topics[topic].type_name.rpartition("/")[2])
+        record = records.get(topic)
+        if record is None:
+            bag.check_type(topic)
+            kind = bag.topics[topic].type_name
+            record = records[topic] = getattr(interface, kind.rpartition("/")[2], None)
+            if record is None:
+                raise ConfigurationError(f"{bag.path}: topic {topic} has messages of type {kind}")
         return from_message(record, deserialize_message(data, message_type(record)))
 
     return read

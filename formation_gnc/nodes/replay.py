@@ -95,9 +95,11 @@ class ReplayNode(ConfiguredNode):
                 f"topic {topic}: not in the bag; it has {', '.join(sorted(self.bag.topics))}"
             )
         try:
-            return message_class(self.bag.topics[topic].type_name)
+            kind = message_class(self.bag.topics[topic].type_name)
         except ConfigurationError as error:
             raise ConfigurationError(f"topic {topic}: {error}") from None
+        self.bag.check_type(topic)
+        return kind
 
     def _read(self) -> Iterator[tuple[int, list[tuple[str, bytes]], set[str]]]:
         """Stamp, messages to play and recorded answers of every tick, for ever when looping."""

@@ -42,6 +42,14 @@ class MessageType:
         except (TypesysError, UnicodeDecodeError, KeyError, ValueError) as error:
             raise ConfigurationError(f"message type {name!r}: its schema cannot be read: {error}") from None
 
+    def is_laid_out_as(self, other: "MessageType") -> bool:
+        """Whether both have the same fields, down to the last nested one; names of constants do not count."""
+
+        def fields(kind: "MessageType") -> dict[str, Any]:
+            return {name: definition[1] for name, definition in kind._store.fielddefs.items()}
+
+        return self.name == other.name and fields(self) == fields(other)
+
     def canonical(self, data: bytes) -> bytes:
         """Serialised message with zeros for what carries no information.
 

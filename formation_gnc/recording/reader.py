@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from itertools import groupby, zip_longest
 from operator import itemgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 from mcap.records import Channel, Schema
 from numpy.typing import NDArray
 
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.recording.decode import MessageType
+from formation_gnc.recording.decode import MessageType, installed_type
 from formation_gnc.recording.mcap_file import McapFile, mcap_files
 from formation_gnc.recording.provenance import LOST
 
@@ -49,6 +49,19 @@ class Difference:
         if not self.field:
             return f"{place}: only in the {'first' if self.second is None else 'second'} bag"
         return f"{place}: {self.field} is {self.first} and {self.second}"
+
+
+class Fields(dict[str, NDArray[Any]]):
+    """Arrays by field; asked for one that the messages of the topic lack, it says so."""
+
+    def __init__(self, place: str, arrays: dict[str, NDArray[Any]]) -> None:
+        """Take the arrays of a place, which errors name."""
+        super().__init__(arrays)
+        self._place = place
+
+    def __missing__(self, field: str) -> NoReturn:
+        """Raise ConfigurationError."""
+        raise ConfigurationError(f"{self._place}: no message has a field {field}")
 
 
 class Bag:
@@ -134,7 +147,8 @@ class Bag:
     def _as_arrays(self, topic: str, rows: list[tuple[bytes, int]]) -> dict[str, NDArray[Any]]:
         stamps = np.array([stamp for _, stamp in rows], dtype=np.int64)
         fields = self._type(topic).arrays([data for data, _ in rows])
-        return {"stamp_ns": stamps, "time": stamps * 1e-9, **fields}
+        place = f"{self.path}: topic {topic}"
+        return Fields(place, {"stamp_ns": stamps, "time": stamps * 1e-9, **fields})
 
     def by_stamp(self, topics: Sequence[str]) -> Iterator[tuple[int, str, list[bytes]]]:
         """Canonical messages by (stamp, topic), sorted, those of one stamp and topic together and sorted too.
@@ -166,6 +180,14 @@ class Bag:
         """MCAP schema and channel record of a topic, from the first file that has it."""
         self._known([topic])
         return self._definitions[topic]
+
+    def check_type(self, topic: str) -> None:
+        """Raise ConfigurationError when a topic's messages are not laid out as the installed type is."""
+        kind = self._type(topic)
+        if not kind.is_laid_out_as(installed_type(kind.name)):
+            raise ConfigurationError(
+                f"{self.path}: topic {topic} was recorded with other fields in {kind.name} than are installed"
+            )
 
     def _known(self, topics: Sequence[str] | None) -> set[str]:
         unknown = set(topics or ()) - self.topics.keys()
