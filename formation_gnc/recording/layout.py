@@ -67,16 +67,25 @@ def foxglove_layout(deputies: Sequence[str]) -> str:
         }
 
     tabs = panel("Tab", "deputies", activeTabIdx=0, tabs=[tab(name) for name in deputies])
+    scene = panel(
+        "3D",
+        "scene",
+        foxglovePanelTitle="Hill frame, drawn by the display node",
+        followTf="hill",
+        followMode="follow-pose",
+        topics={"/markers": {"visible": True}},
+        cameraState={"distance": 2000.0, "phi": 60.0, "thetaOffset": 45.0, "perspective": True, "fovy": 45.0},
+    )
     events = panel("RawMessages", "events", foxglovePanelTitle="Events", topicPath="/events")
     state_of_run = panel("DiagnosticSummary", "run", foxglovePanelTitle="Run", topicToRender="/diagnostics")
     said = panel("RosOut", "rosout", foxglovePanelTitle="What the nodes said")
-    side = _stacked("column", [state_of_run, events, said])
+    side = _stacked("column", [scene, state_of_run, events, said])
     layout = {
         "configById": panels,
         "globalVariables": {},
         "userNodes": {},
         "playbackConfig": {"speed": 1.0},
-        "layout": {"direction": "row", "first": tabs, "second": side, "splitPercentage": 76},
+        "layout": {"direction": "row", "first": tabs, "second": side, "splitPercentage": 70},
     }
     return json.dumps(layout, indent=1) + "\n"
 
