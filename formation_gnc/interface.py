@@ -6,6 +6,7 @@ the message's stamp in nanoseconds of simulated time. The core speaks these, the
 
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,6 +93,14 @@ class Estimate:
     refusals: Counts = field(default_factory=lambda: np.zeros(len(Refusal), dtype=np.uint32))  # (12,)
     blind_direction: Vector = field(default_factory=lambda: np.zeros(6))  # (6,)
     blind: str = ""
+
+
+class Neighbour(NamedTuple):
+    """What a deputy needs to know of another one's estimate."""
+
+    time: int
+    relative_state: Vector  # (6,)
+    mass: float
 
 
 NO_ECLIPSE: Matrix = np.empty((0, 2))

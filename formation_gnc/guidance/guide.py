@@ -21,6 +21,7 @@ from formation_gnc.interface import (
     NOBODY,
     Estimate,
     Matrix,
+    Neighbour,
     Separation,
     Target,
     Vector,
@@ -221,7 +222,9 @@ class Guide(Part[Any, TargetPath]):
         self._untold, self._left = True, old.parameters.formation
         self._until = self._time + round(new.parameters.reconfiguration_time * NANOSECONDS)
 
-    def on_tick(self, estimate: Estimate, *others: Estimate | None) -> tuple[Target, Separation | None]:
+    def on_tick(
+        self, estimate: Estimate, *others: Estimate | Neighbour | None
+    ) -> tuple[Target, Separation | None]:
         """The target at the estimate's stamp, and how near the others will come when that is due.
 
         Args:
@@ -258,7 +261,7 @@ class Guide(Part[Any, TargetPath]):
         )
         return target, self._predict(estimate, target, list(known))
 
-    def _take_place(self, estimate: Estimate, known: Mapping[str, Estimate]) -> None:
+    def _take_place(self, estimate: Estimate, known: Mapping[str, Estimate | Neighbour]) -> None:
         """Take this deputy's place of those that are shared out over the fleet."""
         parameters, fleet = self.parameters, {**known, self._deputy: estimate}
         silent = [name for name in parameters.fleet if name not in fleet]

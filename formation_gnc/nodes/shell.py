@@ -5,6 +5,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from time import monotonic, perf_counter
@@ -27,9 +28,9 @@ except ImportError:  # other builds of Jazzy do not have it; theirs is slower an
     EventsExecutor = SingleThreadedExecutor
 
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.interface import Event, Timing
+from formation_gnc.interface import Estimate, Event, Timing
 from formation_gnc.nodes import topics
-from formation_gnc.nodes.conversion import blank, from_message, message_type, to_message
+from formation_gnc.nodes.conversion import blank, from_message, message_type, neighbour, to_message
 from formation_gnc.nodes.meeting import Meeting, Wires
 from formation_gnc.orbit.propagation import ImpactError
 from formation_gnc.parameters import OWN_OF_ROS, Leaf, dump, leaves, load, read_yaml
@@ -190,34 +191,36 @@ class PartNode[P: Part[Any, Any]](ConfiguredNode):
         self,
         respond: Callable[..., None],
         inputs: Mapping[str, type],
-        others: Mapping[str, type] | None = None,
+        others: Sequence[str] = (),
     ) -> None:
         """Call `respond` once per stamp, when one record of it is there from every input topic.
 
-        `others` are not indispensable, and None when they are lost, as :class:`Meeting` says.
+        `others` are topics of estimates of which a :class:`Neighbour` each comes after the inputs. They are
+        not indispensable, and None when they are lost, as :class:`Meeting` says.
         """
-        hears = {**inputs, **(others or {})}
-        meeting = Meeting(tuple(hears), len(inputs))
-        for topic, record in hears.items():
+        meeting = Meeting((*inputs, *others), len(inputs))
 
-            def take(each: Any, topic: str = topic, started: float | None = None) -> None:
-                started = perf_counter() if started is None else started
-                records = meeting.take(topic, each)
-                if records is None:
-                    return
-                respond(*records)
-                spent = perf_counter() - started
-                self._wires.deliver()
-                self._finish_tick(records[0].time, spent)
+        def take(topic: str, read: Callable[[Any], Any], given: Any) -> None:
+            started = perf_counter()
+            records = meeting.take(topic, read(given))
+            if records is None:
+                return
+            respond(*records)
+            spent = perf_counter() - started
+            self._wires.deliver()
+            self._finish_tick(records[0].time, spent)
 
-            def receive(message: Any, record: type = record, take: Callable[..., None] = take) -> None:
-                started = perf_counter()
-                take(from_message(record, message), started=started)
+        def listen(topic: str, record: type, read: Callable[[Any], Any], raw: bool) -> None:
+            hear, quality = partial(take, topic, read), topics.quality(topics.LATEST)
+            self.create_subscription(message_type(record), topic, hear, quality, raw=raw)
 
+        for topic, record in inputs.items():
             if topic in self._wires:
-                self._wires.hear(topic, take)
+                self._wires.hear(topic, partial(take, topic, lambda each: each))
             else:
-                self.create_subscription(message_type(record), topic, receive, topics.quality(topics.LATEST))
+                listen(topic, record, partial(from_message, record), raw=False)
+        for topic in others:
+            listen(topic, Estimate, neighbour, raw=True)
 
     def _finish_tick(self, time: int, spent: float) -> None:
         """Publish what nobody waits for: the events, and the wall time (s) that the answer took."""

@@ -14,7 +14,7 @@ from hypothesis.extra import numpy as hnp
 from rclpy.serialization import deserialize_message, serialize_message
 
 from formation_gnc import interface
-from formation_gnc.nodes.conversion import from_message, message_type, stamp, to_message
+from formation_gnc.nodes.conversion import from_message, message_type, neighbour, stamp, to_message
 
 RECORDS = [each for each in vars(interface).values() if dataclasses.is_dataclass(each)]
 SCALARS: dict[str, st.SearchStrategy[Any]] = {
@@ -103,3 +103,10 @@ def test_numbers_that_stand_for_something_stand_for_the_same_in_records_and_mess
     status = {each.name: each.value for each in interface.EstimateStatus}
     refusals = {f"REFUSED_{each.name}": each.value for each in interface.Refusal}
     assert constants(messages.Estimate) == status | refusals
+
+
+@given(records(interface.Estimate))
+def test_a_neighbour_is_read_from_the_bytes_of_an_estimate(estimate: interface.Estimate) -> None:
+    heard = neighbour(serialize_message(to_message(estimate)))
+    assert (heard.time, struct.pack("<d", heard.mass)) == (estimate.time, struct.pack("<d", estimate.mass))
+    assert heard.relative_state.tobytes() == estimate.relative_state.tobytes()
