@@ -41,6 +41,9 @@ ECLIPSE_STEPS = 180
 NEVER = -LAST_SECOND * NANOSECONDS
 """Time (ns) long before every run."""
 
+TAKEN = 1.0
+"""Distance (m), with a rate of as much a radian, within which another satellite has a place at least."""
+
 OUT_OF_REACH = 1e9
 """Distance (m) from the chief that is no formation any more."""
 
@@ -163,6 +166,7 @@ class Guide(Part[Any, TargetPath]):
         """Nothing has been looked for yet, eclipses or others that come near."""
         self._eclipse, self._eclipse_looked_for = NO_ECLIPSE, NEVER
         self._predicted, self._warned = NEVER, False
+        self._known: Mapping[str, Estimate | Neighbour] = {}
 
     def design(self, parameters: Any) -> TargetPath:
         """The path of the named formation's place, with its own parameters, in the named model."""
@@ -202,7 +206,23 @@ class Guide(Part[Any, TargetPath]):
                 f"assignment is {self.parameters.assignment}: the whole fleet changes at one tick, and so by "
                 "schedule only; the target stays"
             )
-        return super().prepare(changes)
+        prepared = super().prepare(changes)
+        self._check_that_nobody_is_there(prepared)
+        return prepared
+
+    def _check_that_nobody_is_there(self, prepared: Configuration[Any, TargetPath]) -> None:
+        """Refuse a target that another of the fleet holds."""
+        now = np.array([self._time / NANOSECONDS])
+        target, room = prepared.design.states(now)[0], max(TAKEN, prepared.parameters.separation_warning)
+        if np.array_equal(target, self.configuration.design.states(now)[0]):
+            return
+        reach = room * np.repeat([1.0, prepared.parameters.mean_motion], 3)
+        for name, each in self._known.items():
+            if (np.abs(each.relative_state - target) < reach).all():
+                raise ConfigurationError(
+                    f"place {prepared.parameters.slot} of {prepared.parameters.formation}: {name} is there, "
+                    f"within {room:g} m; each must have its own, and the target stays"
+                )
 
     def _let_take_over(self, time: int, due: Configuration[Any, TargetPath]) -> bool:
         if time < self._until:
@@ -233,7 +253,7 @@ class Guide(Part[Any, TargetPath]):
                 silent.
         """
         self.begin_tick(estimate.time)
-        known = {
+        self._known = known = {
             name: each
             for name, each in zip(self.others, others, strict=True)
             if each is not None and np.isfinite(each.relative_state).all()

@@ -221,3 +221,16 @@ def test_a_fleet_at_odds_is_refused_at_the_start() -> None:
         check_places(dict.fromkeys(FLEET[:3], shared))
     with pytest.raises(ConfigurationError, match="on one place"):
         check_places(dict.fromkeys(FLEET, parameters()))
+
+
+def test_a_place_that_another_holds_is_refused_in_flight_and_the_target_stays() -> None:
+    states = on_the_ring(0.0)
+    guide = Guide("/deputy1/guidance", parameters())
+    guide.on_tick(*map(estimate, states))
+    with pytest.raises(ConfigurationError, match="deputy3 is there"):
+        guide.prepare({"slot": 2})
+    assert guide.parameters.slot == 0
+    guide.prepare({"slot": 2, "projected_circular_orbit.size": 1500.0})
+    states[2, 3:] *= -1.0  # passes through, and does not hold it
+    guide.on_tick(*(estimate(state, 1.0) for state in states))
+    guide.prepare({"slot": 2})
