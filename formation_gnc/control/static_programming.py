@@ -94,7 +94,7 @@ def gmpsp(task: Task, tolerance: Vector, most_iterations: int = 20) -> StaticPla
 
     def predict(history: Matrix) -> Round:
         def rate(k: int, state: Vector) -> Vector:
-            return task.model.derivative(times[k], state, history[k])
+            return task.model.motion(times[k], state, history[k])[0]
 
         states = np.empty((count, 6))
         states[0] = task.state
@@ -102,7 +102,7 @@ def gmpsp(task: Task, tolerance: Vector, most_iterations: int = 20) -> StaticPla
             states[k + 1], states[k + 2] = _two_instants(rate, k, 1, states[k], task.step)
 
         def sensitivities() -> Matrix:
-            slopes = [task.model.dynamics(time, state) for time, state in zip(times, states, strict=True)]
+            slopes = [task.model.motion(*each)[1] for each in zip(times, states, strict=True)]
 
             def turn(k: int, matrix: Matrix) -> Matrix:
                 return np.asarray(-matrix @ slopes[k])
@@ -142,8 +142,8 @@ def advance(
     end, spread = state, BY_STATE
     for node, weight in STAGES[method]:
         moment, here = time + node * step, state + node * step * rate
-        rate = model.derivative(moment, here, acceleration)
-        slope = model.dynamics(moment, here) @ (BY_STATE + node * step * slope) + BY_ACCELERATION
+        rate, jacobian = model.motion(moment, here, acceleration)
+        slope = jacobian @ (BY_STATE + node * step * slope) + BY_ACCELERATION
         end, spread = end + weight * step * rate, spread + weight * step * slope
     return end, spread
 

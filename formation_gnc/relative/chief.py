@@ -27,6 +27,9 @@ from formation_gnc.relative.model import NO_THRUST, Array
 STEPS_PER_TURN = 200
 """Integration steps per revolution of a circular orbit at the perigee: rounding error at order eight."""
 
+LATEST = 2048
+"""States of chiefs that are kept."""
+
 
 @dataclass(frozen=True)
 class ChiefState:
@@ -196,8 +199,8 @@ def _step_at(perigee_radius: float, mu: float) -> float:
     return math.tau / STEPS_PER_TURN * math.sqrt(perigee_radius**3 / mu)
 
 
-# The integration asks for the same few instants again and again: the last ones are kept.
-@lru_cache(maxsize=64)
+# Integrations ask for the same instants again and again, plans for hundreds of them: the last ones are kept.
+@lru_cache(maxsize=LATEST)
 def _kepler_state(chief: KeplerChief, time: float) -> ChiefState:
     anomaly = chief.anomaly(time)
     e = chief.eccentricity
@@ -221,7 +224,7 @@ def pole_in_hill_frame(inclination: float, latitude: float) -> Array:
     return pole
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=LATEST)
 def _oblate_state(chief: OblateChief, time: float) -> ChiefState:
     inertial = chief.inertial(time)
     rotation = hill_rotation(inertial)

@@ -65,6 +65,10 @@ class RelativeModel(ABC):
     def dynamics(self, time: float, state: Array = ON_THE_CHIEF) -> Array:
         """(6, 6) continuous matrix A(t): the Jacobian of `derivative` with respect to the state, there."""
 
+    def motion(self, time: float, state: Array, acceleration: Array = NO_THRUST) -> tuple[Array, Array]:
+        """`derivative` (6,) and `dynamics` (6, 6) at one state, at once."""
+        return self.derivative(time, state, acceleration), self.dynamics(time, state)
+
     def transition(self, time: float, duration: float, state: Array = ON_THE_CHIEF) -> Array:
         """(6, 6) state transition matrix over `duration` from `time`, along the free motion from `state`."""
         return self.discretise(time, duration, state)[0]

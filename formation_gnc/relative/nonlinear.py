@@ -8,6 +8,7 @@ import numpy as np
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.relative.chief import ChiefState, KeplerChief, frame_matrix
 from formation_gnc.relative.factorisation import sdc1
+from formation_gnc.relative.kernels import motion
 from formation_gnc.relative.model import INPUT, NO_THRUST, ON_THE_CHIEF, Array, RelativeModel
 
 
@@ -41,6 +42,10 @@ class NonlinearModel(RelativeModel):
     def dynamics(self, time: float, state: Array = ON_THE_CHIEF) -> Array:
         """(6, 6) Jacobian at the state: Joshi (6.27)-(6.40)."""
         return jacobian(state, self.chief.at(time))
+
+    def motion(self, time: float, state: Array, acceleration: Array = NO_THRUST) -> tuple[Array, Array]:
+        """`derivative` (6,) and `dynamics` (6, 6) at one state, compiled."""
+        return motion(state, acceleration, self.chief.at(time), oblate=False)
 
     def bounded(self, time: float, state: Array) -> Array:
         """(6,) state whose along-track rate gives the deputy the chief's energy: both then take one period.

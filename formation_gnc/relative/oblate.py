@@ -11,6 +11,7 @@ from formation_gnc.orbit.frames import hill_rate, inertial_from_relative
 from formation_gnc.orbit.mean import mean_state, secular_rates
 from formation_gnc.relative.chief import Chief, ChiefState, OblateChief
 from formation_gnc.relative.factorisation import sdc1_oblate
+from formation_gnc.relative.kernels import motion
 from formation_gnc.relative.model import INPUT, NO_THRUST, ON_THE_CHIEF, Array, RelativeModel
 from formation_gnc.relative.nonlinear import jacobian
 
@@ -51,6 +52,10 @@ class OblateModel(RelativeModel):
         matrix = jacobian(state, chief)
         matrix[3:, :3] += oblate_gradient(state, chief)
         return matrix
+
+    def motion(self, time: float, state: Array, acceleration: Array = NO_THRUST) -> tuple[Array, Array]:
+        """`derivative` (6,) and `dynamics` (6, 6) at one state, compiled."""
+        return motion(state, acceleration, self.chief.at(time), oblate=True)
 
     def bounded(self, time: float, state: Array) -> Array:
         """(6,) state whose along-track rate makes the mean latitudes, nodes included, keep their distance.

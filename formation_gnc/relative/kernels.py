@@ -1,0 +1,73 @@
+"""The nonlinear equations of relative motion and their Jacobian at one state, compiled for loops in time."""
+
+from math import sqrt
+
+import numpy as np
+from numba import float64
+from numpy.typing import NDArray
+
+from formation_gnc.orbit.constants import EARTH_RADIUS, J2
+from formation_gnc.orbit.jit import ANY_VECTOR, kernel
+from formation_gnc.relative.chief import ChiefState
+
+Array = NDArray[np.float64]
+
+
+def motion(state: Array, acceleration: Array, chief: ChiefState, oblate: bool) -> tuple[Array, Array]:
+    """Rate of change (6,) of a relative state (6,) and its Jacobian (6, 6), with J2 or without.
+
+    What `OblateModel` and `NonlinearModel` give: point-mass gravity cancels no digits; of J2, with 10^-3 of
+    it, the last three do not count.
+    """
+    strength = 1.5 * J2 * chief.mu * EARTH_RADIUS**2 if oblate else 0.0
+    frame = np.array(
+        [chief.mu, chief.radius, chief.angular_rate, chief.angular_acceleration, chief.tilt_rate, strength]
+    )
+    joint: Array = _motion(np.asarray(state, dtype=np.float64), acceleration, frame, chief.pole)
+    return joint[:, 6], joint[:, :6]
+
+
+@kernel(float64[:, ::1](ANY_VECTOR, ANY_VECTOR, ANY_VECTOR, ANY_VECTOR))
+def _motion(state: Array, acceleration: Array, frame: Array, pole: Array) -> Array:
+    """(6, 7) Jacobian, and the rate of change as its last column."""
+    mu, radius, rate, change, tilt, strength = frame
+    joint = np.zeros((6, 7))
+    for axis in range(3):
+        joint[axis, 3 + axis] = 1.0
+    joint[1, 2] = joint[4, 5] = tilt
+    joint[2, 1] = joint[5, 4] = -tilt
+    joint[3, 0] = joint[4, 1] = rate * rate
+    joint[3, 1], joint[4, 0] = change, -change
+    joint[3, 4], joint[4, 3] = 2.0 * rate, -2.0 * rate
+    joint[3, 2], joint[5, 0] = rate * tilt, -rate * tilt
+    for row in range(6):
+        for column in range(6):
+            joint[row, 6] += joint[row, column] * state[column]
+    place = np.array([radius + state[0], state[1], state[2]])
+    square = place[0] ** 2 + place[1] ** 2 + place[2] ** 2
+    distance = sqrt(square)
+    # mu r / r^3 - mu p / d^3, with d^2 = r^2 (1 + q) and d^3 / r^3 - 1 = q (3 + 3 q + q^2) / (1 + d^3 / r^3)
+    q = (state[0] * (2.0 * radius + state[0]) + state[1] ** 2 + state[2] ** 2) / radius**2
+    growth = q * (3.0 + 3.0 * q + q * q) / (1.0 + (distance / radius) ** 3)
+    central = mu / (square * distance)
+    height = place[0] * pole[0] + place[1] * pole[1] + place[2] * pole[2]
+    sine = height / distance
+    pull = strength / (square * square * distance)
+    for i in range(3):
+        outward = radius if i == 0 else 0.0
+        joint[3 + i, 6] += acceleration[i] - central * (state[i] - growth * outward)
+        # J2 of the deputy less that of the chief: -K { p / d^5 - 5 Z^2 p / d^7 + 2 Z k / d^5 }
+        there = (1.0 - 5.0 * sine**2) * place[i] + 2.0 * height * pole[i]
+        here = (1.0 - 5.0 * pole[0] ** 2) * outward + 2.0 * radius * pole[0] * pole[i]
+        joint[3 + i, 6] -= pull * there - strength / radius**5 * here
+        for j in range(3):
+            outer = place[i] * place[j] / square
+            cross = (place[i] * pole[j] + pole[i] * place[j]) / distance
+            same = 1.0 if i == j else 0.0
+            joint[3 + i, j] += central * (3.0 * outer - same) - pull * (
+                (1.0 - 5.0 * sine**2) * same
+                + 5.0 * (7.0 * sine**2 - 1.0) * outer
+                - 10.0 * sine * cross
+                + 2.0 * pole[i] * pole[j]
+            )
+    return joint
