@@ -150,6 +150,6 @@ class AdaptiveLinearQuadraticRegulator(Controller):
         limit = self._limit / (estimate.mass * self._input_unit)
         flown = np.clip(wanted, -limit, limit)
         following = networks.fly(error, values, flown, tick)
-        if (flown == wanted).all():
+        if (flown == wanted)[self._limit > 0.0].all():
             networks.teach(error, following, slopes, tick)
         return wanted
