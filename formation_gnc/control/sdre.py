@@ -39,7 +39,7 @@ class SdreParameters(QuadraticWeights):
         doc="A(x) x of the equations of motion: about any chief (sdc1) or a circular one (sdc2)",
     )
     update_interval: float = parameter(
-        10.0,
+        60.0,
         unit="s",
         minimum=0.0,
         in_flight=True,
