@@ -12,12 +12,15 @@ from numpy.typing import NDArray
 
 from bench.result import Result
 from formation_gnc.control.adaptive_lqr import AdaptiveLinearQuadraticRegulator, AdaptiveLqrParameters
+from formation_gnc.control.asre import Asre
 from formation_gnc.control.controller import Controller, Vehicle
 from formation_gnc.control.gmpsp import GmpspController
 from formation_gnc.control.hinf import HInfinityController, HinfParameters
 from formation_gnc.control.lqr import LinearQuadraticRegulator, LqrParameters
 from formation_gnc.control.mpc import SETTINGS, ModelPredictiveController, MpcParameters
 from formation_gnc.control.mpsp import MpspController
+from formation_gnc.control.sdre import Sdre, SdreParameters
+from formation_gnc.control.sdre_finite import FiniteSdre
 from formation_gnc.interface import NANOSECONDS, Estimate, Target
 from formation_gnc.mission import Mission, Orbit
 from formation_gnc.orbit.elements import Elements, state_from_elements
@@ -157,13 +160,22 @@ def run() -> list[Result]:
         "H-infinity, full information": HInfinityController(
             HinfParameters(form="full_information"), MISSION, VEHICLE
         ),
+        "SDRE": Sdre(SdreParameters(**BRYSON), MISSION, VEHICLE),
+        "SDRE, a gain at every tick": Sdre(SdreParameters(update_interval=0.0, **BRYSON), MISSION, VEHICLE),
+        "Finite-time SDRE": FiniteSdre(FiniteSdre.Parameters(**BRYSON), MISSION, VEHICLE),
+        "ASRE": Asre(Asre.Parameters(**BRYSON), MISSION, VEHICLE),
         "MPSP": MpspController(MpspController.Parameters(**BRYSON), MISSION, VEHICLE),
         "G-MPSP": GmpspController(GmpspController.Parameters(**BRYSON), MISSION, VEHICLE),
         "Adaptive LQR": AdaptiveLinearQuadraticRegulator(AdaptiveLqrParameters(**BRYSON), MISSION, VEHICLE),
     }.items():
         taken = float(np.median(fly(law, near))) * micro
         results.append(Result(f"{label} tick against MPC's", taken, median, "us", taken / median, ""))
-    for label, planner in {"MPSP": MpspController, "G-MPSP": GmpspController}.items():
+    for label, planner in {
+        "Finite-time SDRE": FiniteSdre,
+        "ASRE": Asre,
+        "MPSP": MpspController,
+        "G-MPSP": GmpspController,
+    }.items():
         taken = plan_time(planner)
         results.append(
             Result(
