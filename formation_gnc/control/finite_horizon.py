@@ -18,7 +18,7 @@ from formation_gnc.mission import Mission
 from formation_gnc.orbit.elements import Elements, elements_from_state
 from formation_gnc.parameters import parameter
 from formation_gnc.relative.chief import KeplerChief, OblateChief
-from formation_gnc.relative.model import RelativeModel
+from formation_gnc.relative.model import RelativeModel, integrate
 from formation_gnc.relative.nonlinear import NonlinearModel
 from formation_gnc.relative.oblate import OblateModel
 
@@ -36,6 +36,11 @@ LEAP = 0.1
 
 SHARE_OF_PATH = 0.01
 """The same as a share of the way since the target before: what a smooth path may bend in a long tick."""
+
+
+COARSE = 8
+"""Integration step for the target's free flight, in those for rounding error: 10^-8 of the distance at order
+eight."""
 
 
 @dataclass(frozen=True)
@@ -320,7 +325,14 @@ def target_after(target: Target, duration: float, model: RelativeModel) -> Vecto
     index = min(int(duration / step), count) if count else 0
     rest = duration - index * step
     if index == count:
-        return model.propagate(index * step if count else 0.0, knots[-1], rest)
+        begin = index * step if count else 0.0
+        return integrate(
+            lambda time, state: model.motion(time, state)[0],
+            begin,
+            knots[-1],
+            rest,
+            COARSE * model.longest_step,
+        )
     s = rest / step
     here, there = knots[index], knots[index + 1]
     slopes = step * here[3:], step * there[3:]
