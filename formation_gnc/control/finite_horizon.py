@@ -191,7 +191,7 @@ class FiniteHorizonController(Controller):
         self._parameters = parameters
         self._tick = mission.tick
         self._limit = vehicle.thrust_limit
-        if not math.ceil(parameters.final_time / parameters.step) <= MOST_STEPS:
+        if parameters.final_time > MOST_STEPS * parameters.step:
             raise DesignError(
                 f"final_time is {parameters.final_time} s in steps of {parameters.step} s; "
                 f"it must be at most {MOST_STEPS} steps"
