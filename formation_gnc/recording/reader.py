@@ -176,6 +176,19 @@ class Bag:
         for (stamp, topic), group in groupby(in_order(), key=itemgetter(0, 1)):
             yield stamp, topic, [data for _, _, data in group]
 
+    def restarts(self, topics: Sequence[str]) -> dict[str, set[int]]:
+        """Stamps (ns), by topic, of messages with which a publisher began to number anew: one started again."""
+        found: dict[str, set[int]] = {topic: set() for topic in topics}
+        heard: set[str] = set()
+        for file in self._files:
+            names = {id: channel.topic for id, channel in file.channels.items() if channel.topic in found}
+            for message in file.messages(names.keys()):
+                topic = names[message.channel_id]
+                if message.sequence == 1 and topic in heard:
+                    found[topic].add(message.log_time)
+                heard.add(topic)
+        return found
+
     def definition(self, topic: str) -> tuple[Schema | None, Channel]:
         """MCAP schema and channel record of a topic, from the first file that has it."""
         self._known([topic])

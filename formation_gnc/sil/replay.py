@@ -2,9 +2,8 @@
 
 What flew is taken from the bag alone. Parameters are its metadata records `parameters NODE`; changes in
 flight are either scheduled there, or are the `/events` of kind `parameters` and are adopted again at their
-tick. A part is given an input only where it was given it in the recorded run, which its `timing` tells; a
-navigation that had acquired anew after ticks on which it was not there had been started again, and is here
-too.
+tick. A part is given an input only where it was given it in the recorded run, which its `timing` tells; one
+that had been started again, whose messages are numbered from 1 again, is here too.
 
 The truth is recorded, not flown: changed parts say what they would have commanded, and nothing answers them.
 """
@@ -55,6 +54,8 @@ class ReplayedPart:
 
     def __init__(self, node: str, values: Mapping[str, Any]) -> None:
         """Build it from its parameters; raises ConfigurationError for what cannot be flown."""
+        self.restarts: Collection[int] = ()
+        """Stamps with whose answers a process began that had been started again."""
         self.node = node
         self.kind = KINDS[node.rpartition("/")[2]]
         self.parameters: Any = load(self.kind.schema, values)
@@ -86,12 +87,13 @@ class ReplayedPart:
         records = () if answer is None else answer if isinstance(answer, tuple) else (answer,)
         return records, self._part.take_events()
 
-    def heard(self, is_heard: bool, recorded: Any) -> bool:
+    def heard(self, time: int, is_heard: bool, recorded: Any) -> bool:
         """Whether to give it this tick's input; starts it again where it had been.
 
         recorded: its output in the recorded run, if there is one.
         """
-        if is_heard and not self._heard_last and getattr(recorded, "status", None) == EstimateStatus.ACQUIRED:
+        acquired = getattr(recorded, "status", None) == EstimateStatus.ACQUIRED
+        if is_heard and (time in self.restarts or (acquired and not self._heard_last)):
             self.start()
         self._heard_last = is_heard
         return is_heard
@@ -152,6 +154,10 @@ def replay(bag: Bag, parameters: Mapping[str, Mapping[str, Any]], read: Read, si
         except ConfigurationError as error:
             raise ConfigurationError(f"{node}: {error}") from None
     outputs = {_sibling(part.node, output) for part in parts for output in part.kind.outputs}
+    answers = {part.node: _sibling(part.node, part.kind.outputs[0]) for part in parts}
+    restarts = bag.restarts(list(answers.values()))
+    for part in parts:
+        part.restarts = restarts[answers[part.node]]
     tick: dict[str, list[bytes]] = {}
     time = None
     for stamp, topic, messages in bag.by_stamp(list(bag.topics)):
@@ -204,7 +210,7 @@ def _fly_tick(
         recorded = read(output, tick[output][-1]) if output in tick else None
         if _sibling(part.node, "measurement") not in tick:
             continue  # no tick of this deputy
-        if not part.heard(part.node in timed or not is_timed, recorded):
+        if not part.heard(time, part.node in timed or not is_timed, recorded):
             continue
         if any(each is None for each in inputs[: len(part.inputs)]):
             continue

@@ -89,10 +89,11 @@ def test_a_recorder_that_comes_late_knows_exactly_what_it_missed(desk: Desk) -> 
             return bool(heard) and heard[-1] > 1.2 * topics.DEPTH
 
         wait_until(late, "more ticks than writers keep")
-    recorder = desk.start("recorder", bag=desk.directory / "bag")
+    recorder = desk.start("recorder", bag=desk.directory / "bag", split_duration=500.0)
     assert plant.wait() == 0
     stop(recorder, *parts)
     bag = Bag(desk.directory / "bag")
+    assert len(list(bag.path.glob("*.mcap"))) > 3, "a file every 500 s"
     lost = {topic: int(count) for topic, count in bag.metadata[LOST].items()}
     for topic in GNC_TOPICS:
         assert lost[topic] > 0

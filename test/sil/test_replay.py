@@ -1,6 +1,7 @@
 """What the node graph recorded, flown again."""
 
 import signal
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -36,6 +37,36 @@ def test_an_unchanged_replay_of_a_graph_run_gives_the_recorded_bits(
     assert list(again.arrays("/events")["kind"]).count("parameters") == 2
     assert again.topics["/deputy1/timing"].count == 900, "of every part at every tick"
     assert identical(recorded, again, gnc_topics(recorded)) == []
+
+
+def test_a_controller_and_a_guidance_started_again_in_flight_are_so_in_the_replay(
+    desk: Desk, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag = desk.directory / "bag"
+    desk.start("recorder", bag=bag)
+    plant = desk.start("plant", duration=900.0, real_time_factor=100.0, deadline=0.5, wait_for_recorder=True)
+    terminals = {kind: desk.start(kind) for kind in PARTS}
+    wait_until(lambda: "acquired" in terminals["navigation"].text, "the first estimate")
+    for kind in ("controller", "guidance"):
+        time.sleep(2.0)
+        before = plant.text.count("miss")
+        terminals[kind].signal(signal.SIGKILL)
+        wait_until(lambda before=before: plant.text.count("miss") > before, f"the plant to miss the {kind}")
+        desk.start(kind)
+    assert plant.wait() == 0
+    for terminal in desk.terminals:
+        if terminal.process.poll() is None:
+            terminal.signal(signal.SIGINT)
+    wait_until(lambda: all(terminal.process.poll() is not None for terminal in desk.terminals), "the end")
+    recorded = Bag(bag)
+    starts = recorded.restarts(["/deputy1/thrust", "/deputy1/target", "/deputy1/estimate"])
+    assert {topic: len(stamps) for topic, stamps in starts.items()} == {
+        "/deputy1/thrust": 1,
+        "/deputy1/target": 1,
+        "/deputy1/estimate": 0,
+    }
+    assert main(["replay", str(bag), "--bag", str(desk.directory / "again")]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "identical on every GNC topic"
 
 
 def call(user: Any, executor: SingleThreadedExecutor, kind: Any, service: str, request: Any) -> Any:
