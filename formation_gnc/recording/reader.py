@@ -177,7 +177,7 @@ class Bag:
             yield stamp, topic, [data for _, _, data in group]
 
     def restarts(self, topics: Sequence[str]) -> dict[str, set[int]]:
-        """Stamps (ns), by topic, of messages with which a publisher began to number anew: one started again."""
+        """Stamps (ns), by topic, of messages with which a publisher began to count anew: started again."""
         found: dict[str, set[int]] = {topic: set() for topic in topics}
         heard: set[str] = set()
         for file in self._files:
