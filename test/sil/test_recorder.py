@@ -75,8 +75,8 @@ def test_a_bag_says_all_of_its_run_and_nothing_of_the_machine(sil: Callable[...,
 
 
 def test_a_recorder_that_comes_late_knows_exactly_what_it_missed(desk: Desk) -> None:
-    ticks = 2 * topics.DEPTH
-    plant = desk.start("plant", duration=float(ticks), real_time_factor=1000.0)
+    ticks = 4 * topics.DEPTH  # at this pace it has 10 s to come in
+    plant = desk.start("plant", duration=float(ticks), real_time_factor=500.0)
     parts = [desk.start(kind) for kind in PARTS]
     with user(desk) as (node, executor):
         heard: list[int] = []
