@@ -1,13 +1,17 @@
 """The nearest approach against every pair at every instant."""
 
+import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from formation_gnc.analysis.separation import minimum_separation
+from formation_gnc.analysis.separation import minimum_separation, predicted_approach
+from formation_gnc.cli import main
+from formation_gnc.recording.reader import Bag
 
 
 @settings(deadline=None)
@@ -29,3 +33,24 @@ def test_no_pair_is_ever_nearer(satellites: int, instants: int, seed: int) -> No
 
 def test_one_satellite_is_near_to_none() -> None:
     assert minimum_separation(np.zeros(1), np.zeros((1, 1, 3)), ["alone"]) is None
+
+
+def test_what_guidance_foresaw_is_the_least_of_all_it_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("signal.signal", lambda *_: None)  # the command means to own its process
+    bags = {name: tmp_path / name for name in ("tetrahedral", "leader_follower")}
+    summaries = {}
+    for name, bag in bags.items():
+        assert main(["sil", name, "--in-process", "--json", "--duration", "100", "--bag", str(bag)]) == 0
+        summaries[name] = json.loads(capsys.readouterr().out)
+    fleet, alone = (Bag(bag) for bag in bags.values())
+    for kind in ("planned", "passive"):
+        said = {f"deputy{k}": fleet.arrays(f"/deputy{k}/separation")[kind].min() for k in (1, 2, 3, 4)}
+        found = predicted_approach(fleet, kind)
+        assert found is not None
+        assert found.distance == min(said.values()) == said[found.pair[0]]
+        assert found.pair[1] in said.keys() - {found.pair[0]}
+        assert summaries["tetrahedral"][f"{kind}_separation_m"] == found.distance
+        assert predicted_approach(alone, kind) is None
+        assert f"{kind}_separation_m" not in summaries["leader_follower"]

@@ -256,7 +256,7 @@ class Guide(Part[Any, TargetPath]):
         self._known = known = {
             name: each
             for name, each in zip(self.others, others, strict=True)
-            if each is not None and np.isfinite(each.relative_state).all()
+            if each is not None and _is_near(each)
         }
         if self._unassigned:
             self._unassigned = False
@@ -285,7 +285,7 @@ class Guide(Part[Any, TargetPath]):
         """Take this deputy's place of those that are shared out over the fleet."""
         parameters, fleet = self.parameters, {**known, self._deputy: estimate}
         silent = [name for name in parameters.fleet if name not in fleet]
-        if silent or not np.isfinite(estimate.relative_state).all():
+        if silent or not _is_near(estimate):
             who = ", ".join(silent) or self._deputy
             self.record(estimate.time, "warning", f"no state of {who}: places stay as they are")
             return
@@ -306,7 +306,7 @@ class Guide(Part[Any, TargetPath]):
         """How near the others will come, now and then; warns when that is too near."""
         parameters = self.parameters
         due = estimate.time - self._predicted >= parameters.separation_interval * NANOSECONDS
-        if not (names and due and np.isfinite(estimate.relative_state).all()):
+        if not (names and due and _is_near(estimate)):
             return None
         self._predicted = estimate.time
         separation = predict(
@@ -380,6 +380,11 @@ def _ahead(step: float, steps: int) -> Vector:
     """(1 + steps,) times (s) of a target and its preview from the tick on."""
     ahead: Vector = step * np.arange(steps + 1.0)
     return ahead
+
+
+def _is_near(estimate: Estimate | Neighbour) -> bool:
+    """Whether a state is finite, and one that a satellite in formation can have."""
+    return bool((np.abs(estimate.relative_state) < OUT_OF_REACH).all())
 
 
 def _check_assignment(parameters: Any) -> None:

@@ -182,6 +182,19 @@ def test_without_a_state_of_everybody_places_stay() -> None:
     assert (event.kind, "deputy3" in event.detail) == ("warning", True)
 
 
+@pytest.mark.parametrize("state", [np.full(6, np.nan), np.full(6, 1e200), np.full(6, -np.inf)])
+def test_a_state_that_nobody_can_have_is_nobodys(state: Array) -> None:
+    guide = Guide("/deputy1/guidance", parameters(assignment="delta_v", separation_warning=10.0))
+    states = on_the_ring(0.0)
+    target, separation = guide.on_tick(estimate(state), *map(estimate, states[1:]))
+    assert (separation, len(target.others)) == (None, 3)
+    others = estimate(state, 1.0), estimate(states[2], 1.0), estimate(states[3], 1.0)
+    target, separation = guide.on_tick(estimate(states[0], 1.0), *others)
+    assert separation is not None
+    assert np.isfinite([separation.planned, separation.passive]).all()
+    assert target.others.tolist() == states[2:].tolist()
+
+
 @pytest.mark.parametrize(
     ("values", "reason"),
     [
