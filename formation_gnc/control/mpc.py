@@ -307,10 +307,10 @@ class ModelPredictiveController(Controller):
         if command is None:
             command = self._follow(time, f"mpc: {self._answer}; the last plan flies")
         if command is None:
-            reserve = self.reserve.command(estimate, target).force / share
+            reserve = self.reserve.command(replace(estimate, mass=self._mass), target).force
             command = Command(reserve, fallback=f"mpc: {self._answer}; no plan, LQR flies")
-        force = self._held(command.force, estimate.time, target)
-        self._force = np.clip(force, -self._limit, self._limit)
+        force = self._held(command.force, time, target)
+        self._force = np.clip(np.nan_to_num(force), -self._limit, self._limit)
         return replace(command, force=force * share)
 
     def _held(self, force: Vector, time: int, target: Target) -> Vector:

@@ -73,10 +73,13 @@ def test_a_command_is_never_nan_and_never_above_the_limit(algorithm, flight, est
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 def test_after_whatever_came_in_the_law_flies_on(algorithm, estimate, target):
-    pilot, state = autopilot(algorithm), np.array([5.0, -8.0, 0.0, 0.0, 0.0, 0.0])
-    bad = [np.full(6, np.nan), np.full(6, np.inf), np.full(6, 1e200), np.full(6, 1e15)]
-    for tick, wrong in enumerate([*bad, *[state] * 20]):
-        thrust, _ = pilot.on_tick(estimate(wrong, 10.0 * tick, chief=CHIEF), target(time=10.0 * tick))
+    pilot, state = autopilot(algorithm, mpc__thrust_rate=1e-4), np.array([5.0, -8.0, 0.0, 0.0, 0.0, 0.0])
+    huge = np.array([1e308, -1e308, 1e308, -1e308, 1e308, -1e308])
+    bad = [np.full(6, np.nan), np.full(6, np.inf), huge, np.full(6, 1e200), np.full(6, 1e15)]
+    for tick, wrong in enumerate([*bad, *bad, *[state] * 20]):
+        mass = np.nan if tick < len(bad) else 100.0
+        seen = estimate(wrong, 10.0 * tick, mass, CHIEF)
+        thrust, _ = pilot.on_tick(seen, target(time=10.0 * tick))
     assert thrust.force.any() == (algorithm != "coast")
 
 
