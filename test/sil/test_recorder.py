@@ -198,6 +198,6 @@ def test_a_kill_at_any_moment_loses_at_most_half_a_second(
             if channel.topic == topics.CLOCK:
                 decoded.append(message.clock.sec)
     assert clocks == decoded == list(range(len(clocks))), "no tick is missing before the last"
-    lacks = (at_kill - clocks[-1]) / PACE
+    lacks = (at_kill - max(clocks, default=0)) / PACE
     record_property("log lost, s of wall time", lacks)
     assert lacks <= 0.5
