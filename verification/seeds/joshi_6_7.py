@@ -9,16 +9,11 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 
-from formation_gnc.control.controller import Vehicle
 from formation_gnc.control.finite_horizon import PLAN_MODELS, Task
 from formation_gnc.control.riccati import Weights, continuous_gain
-from formation_gnc.control.sdre_finite import FiniteSdre, SdreFiniteParameters
 from formation_gnc.control.static_programming import StaticPlan, gmpsp, mpsp, regulated
-from formation_gnc.mission import Mission
-from formation_gnc.mission import Orbit as Chief
 from formation_gnc.orbit.elements import Elements
 from formation_gnc.relative.chief import KeplerChief, frame_matrix
-from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.model import ON_THE_CHIEF, RelativeModel
 from formation_gnc.relative.nonlinear import NonlinearModel
 from formation_gnc.relative.oblate import OblateModel
@@ -39,6 +34,7 @@ from verification.seeds.cases import (
     model,
     table,
 )
+from verification.seeds.joshi_4_5 import HILL, to_go
 from verification.seeds.over_optimum import least, orbit
 
 mpl.use("Agg")
@@ -46,7 +42,6 @@ import matplotlib.pyplot as plt
 
 FINAL = 2000
 STEEP = math.radians(60.0)
-HILL = HillModel(math.sqrt(MU / SEMI_MAJOR_AXIS**3))
 GAIN = continuous_gain(HILL.dynamics(0.0), HILL.INPUT, Weights.scaled(np.eye(6), 1e9 * np.eye(3), TICK))
 TIGHT = np.repeat([1e-5, 1e-8], 3)
 """Terminal error, m and m/s, that counts as none."""
@@ -84,24 +79,6 @@ def task_of(plant: RelativeModel, start: Orbit, goal: Orbit) -> Task:
 def with_guess(task: Task) -> Task:
     """And LQR's history as its guess."""
     return replace(task, guess=regulated(task, HILL, GAIN))
-
-
-def sdre(plant: RelativeModel, start: Orbit, goal: Orbit) -> tuple[Array, Array]:
-    """Finite-time SDRE, solved anew every 20 s for the time to go; the last 40 s are one plan."""
-    unlimited = Vehicle(1.0, np.full(3, np.inf))
-    law = FiniteSdre(SdreFiniteParameters(), Mission(Chief(SEMI_MAJOR_AXIS), tick=TICK), unlimited)
-    kept: list[Array] = []
-
-    def thrust(time: float, state: Array) -> Array:
-        left = FINAL - round(time)
-        if left % 20 == 0 and left > 20:
-            steps = max(20, math.ceil(left / 20.0))
-            plan = law.plan(Task(plant, time, state, goal.state(float(FINAL)), float(left), steps))
-            ends = np.arange(min(left, 40.0) + 1.0)
-            kept[:] = list(plan.mean(ends[:-1], ends[1:]))
-        return kept.pop(0)
-
-    return fly(plant, start.state(0.0), thrust, FINAL)
 
 
 def distance(error: Array) -> float:
@@ -297,7 +274,7 @@ def tables(directory: Path) -> tuple[str, list[Figure]]:
         dense = plan.acceleration.reshape(FINAL, -1, 3).mean(axis=1)  # over each second
         flights = {
             "LQR": fly(case.plant, task.state, lambda time, _, each=history: each[round(time)], FINAL),
-            "SDRE": sdre(case.plant, case.start, case.goal),
+            "SDRE": fly(case.plant, task.state, to_go(case.plant, "sdc1", case.goal, FINAL), FINAL),
             own: fly(case.plant, task.state, lambda time, _, each=dense: each[round(time)], FINAL),
         }
         left = {name: states[-1] - task.goal for name, (states, _) in flights.items()}
