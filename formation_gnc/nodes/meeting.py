@@ -15,33 +15,44 @@ class Meeting:
 
     def __init__(self, topics: Sequence[str], needed: int) -> None:
         """Wait for these topics; the first `needed` (one or more) are indispensable."""
-        self._topics, self._needed = tuple(topics), needed
+        self._topics, self._others = tuple(topics), tuple(topics[needed:])
         self._latest: dict[str, Any] = {}
         self._lost: set[str] = set()
         self._answered: int | None = None
 
     def take(self, topic: str, record: Any) -> list[Any] | None:
         """Take a record in; once per stamp, the records of all topics in order, None for who is lost."""
-        pace = self._latest.get(self._topics[0])
-        if pace is not None:
-            if topic == self._topics[0] and record.time != pace.time != self._answered:
-                self._lost |= {
-                    each for each in self._topics[self._needed :] if not self._has(each, pace.time)
-                }
-            elif record.time >= pace.time:
-                self._lost.discard(topic)
-        self._latest[topic] = record
-        pace = self._latest.get(self._topics[0])
+        if self._others:
+            self._mind_the_lost(topic, record)
+        latest = self._latest
+        latest[topic] = record
+        pace = latest.get(self._topics[0])
         if pace is None or pace.time == self._answered:
             return None
-        there = [self._has(each, pace.time) for each in self._topics]
-        if not all(here or each in self._lost for each, here in zip(self._topics, there, strict=True)):
-            return None
+        records = []
+        for each in self._topics:
+            there = latest.get(each)
+            if there is None or there.time != pace.time:
+                if each not in self._lost:
+                    return None
+                there = None
+            records.append(there)
         self._answered = pace.time
-        return [self._latest[each] if here else None for each, here in zip(self._topics, there, strict=True)]
+        return records
 
-    def _has(self, topic: str, time: int) -> bool:
-        return topic in self._latest and self._latest[topic].time == time
+    def _mind_the_lost(self, topic: str, record: Any) -> None:
+        """Before a record is taken in: who is to be given up now, and who is back."""
+        pace = self._latest.get(self._topics[0])
+        if pace is None:
+            return
+        if topic == self._topics[0] and record.time != pace.time != self._answered:
+            self._lost |= {
+                each
+                for each in self._others
+                if each not in self._latest or self._latest[each].time != pace.time
+            }
+        elif record.time >= pace.time:
+            self._lost.discard(topic)
 
 
 class Wires:
