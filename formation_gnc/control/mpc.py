@@ -310,7 +310,8 @@ class ModelPredictiveController(Controller):
             reserve = self.reserve.command(replace(estimate, mass=self._mass), target).force
             command = Command(reserve, fallback=f"mpc: {self._answer}; no plan, LQR flies")
         force = self._held(command.force, time, target)
-        self._force = np.clip(np.nan_to_num(force), -self._limit, self._limit)
+        if self._parameters.thrust_rate > 0.0:  # from where the next force may differ so much only
+            self._force = np.clip(np.nan_to_num(force), -self._limit, self._limit)
         return replace(command, force=force * share)
 
     def _held(self, force: Vector, time: int, target: Target) -> Vector:
