@@ -28,8 +28,8 @@ from formation_gnc.orbit.frames import hill_rotation, inertial_from_relative, re
 from formation_gnc.orbit.propagation import advance_with_transition
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.schweighart_sedwick import CircularReference, SchweighartSedwickModel
+from verification.figure import TABLE, Figure, failures
 from verification.laws import all_laws
-from verification.relative_motion import TABLE, Figure, failures
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

@@ -17,8 +17,8 @@ from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.forces import Body, Forces
 from formation_gnc.orbit.frames import relative_from_inertial
 from formation_gnc.orbit.propagation import Propagator
+from verification.figure import TABLE, Figure, failures
 from verification.independent import Basilisk, Heyoka, Places, jpl, series
-from verification.relative_motion import TABLE, Figure, failures
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

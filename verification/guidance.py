@@ -28,7 +28,7 @@ from formation_gnc.orbit.propagation import Propagator
 from formation_gnc.recording.reader import Bag, identical
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.tschauner_hempel import TschaunerHempelModel
-from verification.relative_motion import TABLE, Figure, failures
+from verification.figure import TABLE, Figure, failures
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

@@ -21,7 +21,7 @@ from formation_gnc.interface import Estimate, EstimateStatus, Measurement
 from formation_gnc.plant.plant import Plant
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import find_scenario, load_scenario
-from verification.relative_motion import TABLE, Figure
+from verification.figure import TABLE, Figure
 
 SCENARIOS = find_scenario("leader_follower").parent
 EXPECTED = Path(__file__).with_name("laws.csv")

@@ -27,7 +27,7 @@ from formation_gnc.navigation.rehearsal import START, Sample, navigator, nees, r
 from formation_gnc.orbit.frames import hill_transform
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
-from verification.relative_motion import Figure, failures
+from verification.figure import Figure, failures
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

@@ -7,7 +7,6 @@ import itertools
 import math
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib as mpl
@@ -30,6 +29,7 @@ from formation_gnc.relative.schweighart_sedwick import (
     SchweighartSedwickNodalModel,
 )
 from formation_gnc.relative.tschauner_hempel import TschaunerHempelModel
+from verification.figure import TABLE, Figure, failures
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
@@ -39,35 +39,6 @@ Array = NDArray[np.float64]
 ORBITS = 5
 NO_THRUST = np.zeros(3)
 AXES = ("radial", "along-track", "cross-track")
-
-
-@dataclass(frozen=True)
-class Figure:
-    """A published or required figure beside ours."""
-
-    name: str
-    printed: str
-    ours: float
-    unit: str
-    least: float
-    greatest: float
-
-    @property
-    def holds(self) -> bool:
-        """Whether ours lies within its tolerance."""
-        return self.least <= self.ours <= self.greatest
-
-    @property
-    def row(self) -> str:
-        """Line of a Markdown table."""
-        verdict = "yes" if self.holds else "**NO**"
-        return (
-            f"| {self.name} | {self.printed} | {self.ours:.4g} {self.unit} | "
-            f"{self.least:g} to {self.greatest:g} {self.unit} | {verdict} |"
-        )
-
-
-TABLE = "| figure | printed | ours | stated tolerance | holds |\n|---|---|---|---|---|"
 
 
 def advance(state: Array, duration: float) -> Array:
@@ -348,14 +319,6 @@ def all_models(directory: Path) -> tuple[str, list[Figure]]:
     plot.savefig(directory / "relative_motion_models.png", dpi=110, metadata={"Software": None})
     plt.close(plot)
     return "\n".join(lines), limits
-
-
-def failures(figures: Sequence[Figure]) -> int:
-    """How many figures are outside their tolerance; each is named on standard error."""
-    failed = [figure for figure in figures if not figure.holds]
-    for figure in failed:
-        print(f"outside its tolerance: {figure.row}", file=sys.stderr)
-    return len(failed)
 
 
 def main(directory: Path) -> int:

@@ -8,7 +8,7 @@ import importlib
 import pkgutil
 from pathlib import Path
 
-from verification.relative_motion import TABLE, Figure, failures
+from verification.figure import TABLE, Figure, failures
 
 HEADING = """# The seeds' nonlinear optimal laws
 

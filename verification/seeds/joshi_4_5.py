@@ -19,7 +19,7 @@ from formation_gnc.mission import Orbit as Chief
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.model import RelativeModel
 from verification.control import save
-from verification.relative_motion import Figure
+from verification.figure import Figure
 from verification.seeds.cases import (
     MU,
     SEMI_MAJOR_AXIS,

@@ -18,7 +18,7 @@ from formation_gnc.relative.model import ON_THE_CHIEF, RelativeModel
 from formation_gnc.relative.nonlinear import NonlinearModel
 from formation_gnc.relative.oblate import OblateModel
 from verification.control import save
-from verification.relative_motion import Figure
+from verification.figure import Figure
 from verification.seeds.cases import (
     KM,
     MU,

@@ -12,7 +12,7 @@ from formation_gnc.control.riccati import Weights, continuous_cost_to_go
 from formation_gnc.relative.chief import KeplerChief
 from formation_gnc.relative.oblate import OblateModel
 from verification.control import save
-from verification.relative_motion import Figure
+from verification.figure import Figure
 from verification.seeds.cases import (
     KM,
     MU,

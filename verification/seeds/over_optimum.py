@@ -19,8 +19,8 @@ from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import inertial_from_relative
 from formation_gnc.relative.chief import KeplerChief, OblateChief
 from verification.control import estimate
+from verification.figure import Figure
 from verification.optimum import Field, free_flight, optimum
-from verification.relative_motion import Figure
 from verification.seeds.cases import SEMI_MAJOR_AXIS, TRUE_ANOMALY, Array, effort, fly
 
 FINAL, TICK, MASS = 2000.0, 10.0, 100.0

@@ -13,7 +13,7 @@ from scipy.integrate import solve_bvp
 
 from formation_gnc.control.steering import Cost, Sequence, System, approximating_sequence
 from verification.control import save
-from verification.relative_motion import Figure
+from verification.figure import Figure
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

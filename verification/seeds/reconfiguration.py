@@ -11,7 +11,7 @@ from formation_gnc.control.registry import ALGORITHMS
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
 from verification.control import save
-from verification.relative_motion import Figure
+from verification.figure import Figure
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

@@ -1,0 +1,42 @@
+"""A figure with its tolerance: what every page of the verification is made of."""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A published or required figure beside ours."""
+
+    name: str
+    printed: str
+    ours: float
+    unit: str
+    least: float
+    greatest: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether ours lies within its tolerance."""
+        return self.least <= self.ours <= self.greatest
+
+    @property
+    def row(self) -> str:
+        """Line of a Markdown table."""
+        verdict = "yes" if self.holds else "**NO**"
+        return (
+            f"| {self.name} | {self.printed} | {self.ours:.4g} {self.unit} | "
+            f"{self.least:g} to {self.greatest:g} {self.unit} | {verdict} |"
+        )
+
+
+TABLE = "| figure | printed | ours | stated tolerance | holds |\n|---|---|---|---|---|"
+
+
+def failures(figures: Sequence[Figure]) -> int:
+    """How many figures are outside their tolerance; each is named on standard error."""
+    failed = [figure for figure in figures if not figure.holds]
+    for figure in failed:
+        print(f"outside its tolerance: {figure.row}", file=sys.stderr)
+    return len(failed)
