@@ -9,6 +9,7 @@ class Snapshot:
     """Keeps the messages of the last stretch of simulated time, and writes them to a bag on a trigger.
 
     Every trigger fills a file of its own in the bag with what came since the last one, as far as it is kept.
+    ``/clock`` running back by more than that stretch begins a new run: the old one is forgotten.
     """
 
     def __init__(self, bag: BagWriter, duration: float) -> None:
@@ -19,9 +20,12 @@ class Snapshot:
 
     def write(self, topic: str, data: bytes, stamp_ns: int, sequence: int) -> None:
         """Keep one message; takes what `BagWriter.write` takes."""
+        if topic == "/clock" and stamp_ns < self._latest - self._duration_ns:
+            self._kept.clear()
+            self._latest = stamp_ns
         self._kept.append((topic, data, stamp_ns, sequence))
         self._latest = max(self._latest, stamp_ns)
-        while self._kept[0][2] <= self._latest - self._duration_ns:
+        while self._kept and self._kept[0][2] <= self._latest - self._duration_ns:
             self._kept.popleft()
 
     def trigger(self) -> int:

@@ -1,3 +1,6 @@
+from pathlib import Path
+
+from formation_gnc.interface import NANOSECONDS
 from formation_gnc.recording import Bag
 from formation_gnc.recording.snapshot import Snapshot
 from formation_gnc.recording.writer import BagWriter
@@ -31,3 +34,29 @@ def test_what_no_trigger_asked_for_is_not_written(tmp_path, flight) -> None:
         snapshot = Snapshot(writer, 20.0)
         snapshot.write("/clock", flight[0].data, 1, 1)
     assert Bag(tmp_path / "run").topics["/clock"].count == 0
+
+
+def kept_of(directory: Path, data: bytes, stamps: list[tuple[str, int]]) -> tuple[int, int, int]:
+    """How many messages are kept of these, and their first and last stamp, s."""
+    with BagWriter(directory, {}) as writer:
+        for topic in ("/clock", "/late"):
+            writer.add_topic(topic, "rosgraph_msgs/msg/Clock", depth=10)
+        snapshot = Snapshot(writer, 20.0)
+        for sequence, (topic, second) in enumerate(stamps):
+            snapshot.write(topic, data, second * NANOSECONDS, sequence)
+        count = snapshot.trigger()
+        snapshot.write("/late", data, 0, len(stamps))  # nothing is kept that it could be told to follow
+    bag = Bag(directory)
+    return count, bag.start_ns // NANOSECONDS, bag.end_ns // NANOSECONDS
+
+
+def test_a_message_from_long_ago_costs_nothing_of_what_is_kept(tmp_path, flight) -> None:
+    stamps = [("/clock", second) for second in range(100)]
+    late = [*stamps[:90], ("/late", 3), *stamps[90:]]
+    assert kept_of(tmp_path / "run", flight[0].data, stamps) == (20, 80, 99)
+    assert kept_of(tmp_path / "late", flight[0].data, late) == (21, 3, 99)
+
+
+def test_a_run_that_begins_anew_is_kept_as_long_as_the_first(tmp_path, flight) -> None:
+    stamps = [("/clock", second) for second in [*range(100), *range(50)]]
+    assert kept_of(tmp_path / "run", flight[0].data, stamps) == (20, 30, 49)
