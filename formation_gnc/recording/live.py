@@ -138,7 +138,8 @@ class Player(ServerListener):
     def on_playback_control_request(self, playback_control_request: PlaybackControlRequest) -> PlaybackState:
         """Note what a viewer asks for; comes from a thread of the server."""
         self._playing = playback_control_request.playback_command == PlaybackCommand.Play
-        self._speed = playback_control_request.playback_speed
+        if playback_control_request.playback_speed > 0.0:  # with any other nothing would ever come
+            self._speed = playback_control_request.playback_speed
         sought = playback_control_request.seek_time
         if sought is not None:
             self._time = self._sought = sought
