@@ -9,6 +9,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 from formation_gnc_msgs import msg as messages
+from rclpy.serialization import deserialize_message
 
 from formation_gnc import interface
 from formation_gnc.errors import ConfigurationError
@@ -97,15 +98,21 @@ def from_message[T](record_type: type[T], message: Any) -> T:
     return record_type(**values)
 
 
-_NEIGHBOUR = struct.Struct("<4xiII5s7x6d336xd")
+_NEIGHBOUR = struct.Struct("<2s2xiI9s7x6d336xd")
 """The beginning of an Estimate in CDR, little-endian: encapsulation, stamp, frame_id, relative_state, then a
 covariance and a chief_state left out, and mass."""
+
+_IN_PLACE = b"\0\1", b"\5\0\0\0hill\0"
+"""Encapsulation (little-endian) and frame_id with which all of that is where it is looked for."""
 
 
 def neighbour(data: bytes) -> Neighbour:
     """What a deputy needs of another one's Estimate, from its CDR bytes: a fleet of N hears N (N - 1) of them
     in a tick, and to build them whole takes three times as long as all else that it does."""
-    seconds, nanoseconds, _, _, *state, mass = _NEIGHBOUR.unpack_from(data)
+    encapsulation, seconds, nanoseconds, frame_id, *state, mass = _NEIGHBOUR.unpack_from(data)
+    if (encapsulation, frame_id) != _IN_PLACE:
+        whole = deserialize_message(data, messages.Estimate)
+        return Neighbour(stamp(whole), np.array(whole.relative_state), whole.mass)
     return Neighbour(seconds * NANOSECONDS + nanoseconds, np.array(state), mass)
 
 

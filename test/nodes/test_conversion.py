@@ -105,8 +105,10 @@ def test_numbers_that_stand_for_something_stand_for_the_same_in_records_and_mess
     assert constants(messages.Estimate) == status | refusals
 
 
-@given(records(interface.Estimate))
-def test_a_neighbour_is_read_from_the_bytes_of_an_estimate(estimate: interface.Estimate) -> None:
-    heard = neighbour(serialize_message(to_message(estimate)))
+@given(records(interface.Estimate), st.sampled_from(["hill", "", "rtn ", "lvlh", "deputy1/hill"]))
+def test_a_neighbour_is_read_from_the_bytes_of_an_estimate(estimate: interface.Estimate, frame: str) -> None:
+    message = to_message(estimate)
+    message.header.frame_id = frame
+    heard = neighbour(serialize_message(message))
     assert (heard.time, struct.pack("<d", heard.mass)) == (estimate.time, struct.pack("<d", estimate.mass))
     assert heard.relative_state.tobytes() == estimate.relative_state.tobytes()
