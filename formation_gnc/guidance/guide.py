@@ -164,7 +164,7 @@ class Guide(Part[Any, TargetPath]):
 
     def forget(self) -> None:
         """Nothing has been looked for yet, eclipses or others that come near."""
-        self._eclipse, self._eclipse_looked_for = NO_ECLIPSE, NEVER
+        self._eclipse, self._eclipse_due = NO_ECLIPSE, NEVER
         self._predicted, self._warned = NEVER, False
         self._known: Mapping[str, Estimate | Neighbour] = {}
 
@@ -324,11 +324,12 @@ class Guide(Part[Any, TargetPath]):
         return separation
 
     def _coming_eclipse(self, estimate: Estimate) -> Matrix:
-        """Eclipses of the chief, looked for two revolutions ahead in every revolution."""
+        """Eclipses of the chief, looked for two revolutions ahead in every revolution; of a chief that has no
+        orbit nothing new is known, and the next point of an orbit is the time to look again."""
         revolution = math.tau / self.parameters.mean_motion
         seconds = estimate.time / NANOSECONDS
-        if estimate.time - self._eclipse_looked_for >= revolution * NANOSECONDS:
-            self._eclipse_looked_for = estimate.time
+        if estimate.time >= self._eclipse_due and np.isfinite(estimate.chief_state).all():
+            wait = revolution
             try:
                 self._eclipse = seconds + eclipses(
                     estimate.chief_state,
@@ -336,8 +337,9 @@ class Guide(Part[Any, TargetPath]):
                     revolution / ECLIPSE_STEPS,
                     self.parameters.epoch + seconds,
                 )
-            except ImpactError:  # the estimate's chief flies nowhere: nothing is known
-                self._eclipse = NO_ECLIPSE
+            except ImpactError:
+                wait /= ECLIPSE_STEPS
+            self._eclipse_due = estimate.time + round(wait * NANOSECONDS)
         while len(self._eclipse) and self._eclipse[0, 1] <= seconds:
             self._eclipse = self._eclipse[1:]
         return self._eclipse

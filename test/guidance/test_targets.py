@@ -242,19 +242,24 @@ def test_two_satellites_on_one_place_are_refused_now_and_later() -> None:
         check_places({"a": later, "b": parameters(1)})
 
 
+CHIEF = state_from_elements(Elements(7.0e6, 0.0, 0.4, 0.0, 0.0, 0.0))
+
+
+def eclipse_of(guided: Guide, seconds: float, chief: Array) -> Array:
+    time = round(seconds * NANOSECONDS)
+    return guided.on_tick(Estimate(time, np.ones(6), np.eye(6), chief, 1.0, False, [], [], [], 0.0, 0))[
+        0
+    ].eclipse
+
+
 def test_the_coming_eclipses_come_with_the_target_until_they_are_over() -> None:
     guided = guide(epoch=EQUINOX)
     revolution = math.tau / guided.parameters.mean_motion
-    chief = state_from_elements(Elements(7.0e6, 0.0, 0.4, 0.0, 0.0, 0.0))
 
     def eclipse_at(share: float) -> Array:
         seconds = share * revolution
-        state = advance_with_transition(chief, np.zeros(3), seconds, 200)[0] if seconds else chief
-        return guided.on_tick(
-            Estimate(
-                round(seconds * NANOSECONDS), np.ones(6), np.eye(6), state, 1.0, False, [], [], [], 0.0, 0
-            )
-        )[0].eclipse
+        state = advance_with_transition(CHIEF, np.zeros(3), seconds, 200)[0] if seconds else CHIEF
+        return eclipse_of(guided, seconds, state)
 
     first = eclipse_at(0.0)
     assert len(first) == 2  # two revolutions ahead
@@ -267,3 +272,13 @@ def test_the_coming_eclipses_come_with_the_target_until_they_are_over() -> None:
 
 def test_a_chief_that_flies_nowhere_has_no_eclipse(at: Callable[..., Estimate]) -> None:
     assert not len(guide().on_tick(at(0.0))[0].eclipse)
+
+
+@pytest.mark.parametrize("bad", [np.full(6, np.nan), np.zeros(6)])
+def test_eclipses_are_looked_for_again_soon_after_a_bad_chief_and_kept_until_then(bad: Array) -> None:
+    fresh, guided = guide(epoch=EQUINOX), guide(epoch=EQUINOX)
+    assert not len(eclipse_of(fresh, 0.0, bad))
+    step = math.tau / fresh.parameters.mean_motion / 180
+    assert len(eclipse_of(fresh, step + 1e-3, CHIEF)) == 2
+    first = eclipse_of(guided, 0.0, CHIEF)
+    assert eclipse_of(guided, 181 * step, bad).tolist() == first[1:].tolist(), "looked two revolutions ahead"
