@@ -33,7 +33,7 @@ def run(options: argparse.Namespace) -> int:
     from formation_gnc.analysis.metrics import deputies_of
     from formation_gnc.navigation.open_loop import Comparison, as_json, compare
     from formation_gnc.recording.reader import Bag
-    from formation_gnc.sil.scenario import parameters_in
+    from formation_gnc.sil.scenario import given_to
 
     bag = Bag(options.bag)
     known = deputies_of(bag)
@@ -42,9 +42,7 @@ def run(options: argparse.Namespace) -> int:
     comparisons: list[Comparison] = []
     for deputy in [options.deputy] if options.deputy else known:
         node = f"/{deputy}/navigation"
-        comparisons.append(
-            compare(bag, deputy, parameters_in(options.params, node) if options.params else {})
-        )
+        comparisons.append(compare(bag, deputy, given_to(options.params, node) if options.params else {}))
     if options.json:
         print(
             json.dumps(

@@ -93,16 +93,6 @@ def load_scenario(name: str, overrides: Mapping[str, Mapping[str, Any]] | None =
     return Scenario(path.stem, plant, deputies)
 
 
-def parameters_in(path: Path, node: str) -> dict[str, Any]:
-    """What a parameter file gives to a node, by dotted name, unchecked; raises ConfigurationError for an
-    unreadable one."""
-    values: dict[str, Any] = {}
-    for pattern, section in _sections(path):
-        if _matches(pattern, node):
-            values |= section
-    return values
-
-
 def find_scenario(name: str) -> Path:
     """Path of a scenario's file, given its name or its path."""
     if name.endswith((".yaml", ".yml")) or "/" in name:
