@@ -191,17 +191,17 @@ def _summarise(scenario: Scenario, bag: Path, speedup: float, as_json: bool) -> 
     from formation_gnc.analysis.flown import Flown
     from formation_gnc.analysis.metrics import figures
     from formation_gnc.analysis.overview import draw_overview
-    from formation_gnc.analysis.separation import nearest_approach, predicted_approach
+    from formation_gnc.analysis.separation import predicted_approach
     from formation_gnc.recording.reader import Bag
 
     recorded = Bag(bag)
-    result = figures(recorded)
+    result, flown = figures(recorded), Flown(recorded)
     separations = {
-        "minimum separation": nearest_approach(recorded),
+        "minimum separation": flown.nearest,
         "least predicted on target": predicted_approach(recorded, "planned"),
         "least predicted without thrust": predicted_approach(recorded, "passive"),
     }
-    picture = draw_overview(Flown(recorded), bag / "overview.png", scenario.name)
+    picture = draw_overview(flown, bag / "overview.png", scenario.name)
     if as_json:
         summary = {
             "scenario": scenario.name,
