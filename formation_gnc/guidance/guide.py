@@ -328,7 +328,7 @@ class Guide(Part[Any, TargetPath]):
         orbit nothing new is known, and the next point of an orbit is the time to look again."""
         revolution = math.tau / self.parameters.mean_motion
         seconds = estimate.time / NANOSECONDS
-        if estimate.time >= self._eclipse_due and np.isfinite(estimate.chief_state).all():
+        if estimate.time >= self._eclipse_due:
             wait = revolution
             try:
                 self._eclipse = seconds + eclipses(
@@ -337,7 +337,7 @@ class Guide(Part[Any, TargetPath]):
                     revolution / ECLIPSE_STEPS,
                     self.parameters.epoch + seconds,
                 )
-            except ImpactError:
+            except ImpactError:  # or a state that is not finite
                 wait /= ECLIPSE_STEPS
             self._eclipse_due = estimate.time + round(wait * NANOSECONDS)
         while len(self._eclipse) and self._eclipse[0, 1] <= seconds:
