@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,24 +22,29 @@ from formation_gnc.sil.scenario import load_scenario
 BROWSER = shutil.which("chromium")
 
 
-def fly(directory: Path, duration: float) -> Bag:
-    overrides = {
-        "/plant": {"duration": duration},
-        "/**/controller": {"schedule": ["{at: 100.0, algorithm: coast}"]},
-    }
+COAST = {"/**/controller": {"schedule": ["{at: 100.0, algorithm: coast}"]}}
+CHANGE = {"/**/guidance": {"schedule": ["{at: 100.0, formation: three_in_plane_one_out}"]}}
+
+
+def fly(directory: Path, scenario: str, change: dict[str, dict[str, Any]]) -> Bag:
+    overrides = {"/plant": {"duration": 300.0}} | change
     with BagWriter(directory, {"run": {"name": "<b>bold</b>"}}) as writer:
-        Run(load_scenario("leader_follower", overrides)).fly(InProcessRecorder(writer))
+        Run(load_scenario(scenario, overrides)).fly(InProcessRecorder(writer))
     return Bag(directory)
+
+
+def page_of(bag: Bag) -> Path:
+    return write_report(bag, Flown(bag), bag.path / "report.html", "a <title>")
 
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Bag:
-    return fly(tmp_path_factory.mktemp("report") / "bag", 300.0)
+    return fly(tmp_path_factory.mktemp("report") / "bag", "leader_follower", COAST)
 
 
 @pytest.fixture(scope="module")
 def page(bag: Bag) -> Path:
-    return write_report(bag, Flown(bag), bag.path / "report.html", "a <title>")
+    return page_of(bag)
 
 
 def test_the_page_is_self_contained_and_says_what_was_flown(page: Path, bag: Bag) -> None:
@@ -65,18 +71,27 @@ def test_a_curve_never_has_more_than_twice_the_points_and_keeps_even_steps() -> 
 
 
 @pytest.mark.skipif(BROWSER is None, reason="chromium is not installed")
-def test_a_browser_shows_the_page_without_errors_and_its_slider_moves_the_deputy(page: Path) -> None:
+@pytest.mark.parametrize(
+    ("scenario", "change", "deputies", "plots"),
+    # in space, and two of each deputy; of several also how far apart they are
+    [("leader_follower", COAST, 1, 1 + 2), ("tetrahedral", CHANGE, 4, 1 + 1 + 4 * 2)],
+)
+def test_a_browser_shows_the_page_without_errors_and_its_slider_moves_every_deputy(
+    tmp_path: Path, scenario: str, change: dict[str, dict[str, Any]], deputies: int, plots: int
+) -> None:
+    page = page_of(fly(tmp_path / "bag", scenario, change))
     # what the page does is written into its title, which the dumped document shows
     probe = page.with_name("probe.html")
     script = """<script>window.addEventListener('load', () => setTimeout(() => {
       const all = document.querySelectorAll('.js-plotly-plot'), first = all[0];
       const steps = first.layout.sliders[0].steps, drawn = first.querySelector('canvas') !== null;
-      const moving = first.data.length - 1, before = first.data[moving].y[0];
+      const where = () => first.data.filter(each => each.name.endsWith('at time')).map(each => each.y[0]);
+      const before = where();
       Plotly.animate(first, ...steps[steps.length - 1].args);
       Plotly.restyle(all[1], {visible: 'legendonly'}, [0]);
       setTimeout(() => {
-        const moved = first.data[moving].y[0] !== before && drawn, hidden = all[1].data[0].visible;
-        document.title = `plots ${all.length} steps ${steps.length} moved ${moved} hidden ${hidden}`;
+        const moved = where().filter((y, deputy) => y !== before[deputy]).length;
+        document.title = `shown ${[all.length, steps.length, drawn, moved, all[1].data[0].visible]}`;
       }, 2000);
     }, 1000));</script></body>"""
     probe.write_text(page.read_text().replace("</body>", script))
@@ -98,6 +113,6 @@ def test_a_browser_shows_the_page_without_errors_and_its_slider_moves_the_deputy
     wrong = [line for line in said if ":INFO:CONSOLE" not in line or "Uncaught" in line]
     assert not wrong
     assert "slider-container" in result.stdout
-    title = re.search(r"<title>plots (\d+) steps (\d+) moved (\w+) hidden (\w+)</title>", result.stdout)
+    title = re.search(r"<title>shown (.*)</title>", result.stdout)
     assert title is not None, said
-    assert title.groups() == ("3", "120", "true", "legendonly")
+    assert title[1] == f"{plots},120,true,{deputies},legendonly"
