@@ -176,6 +176,8 @@ def _solve(
 ) -> tuple[Matrix, Matrix, str]:
     """Predict and correct until the terminal error is what it is to be, or a reason to stop appears.
 
+    It corrects at least once: a guess that arrives may do so at many times the least effort.
+
     Returns the history, the terminal errors (iterations + 1, 6) and why the history is not to be flown.
     """
     history, wanted, errors = guess, np.zeros(6), list[Vector]()
@@ -188,7 +190,7 @@ def _solve(
                 failure = f"the final time is past by {abs(task.duration):g} s"
             elif not np.isfinite(errors[-1]).all():
                 failure = f"the prediction of iteration {len(errors) - 1} is not finite"
-            elif (np.abs(errors[-1] - wanted) <= tolerance).all():
+            elif len(errors) > 1 and (np.abs(errors[-1] - wanted) <= tolerance).all():
                 pass
             elif len(errors) > most_iterations:
                 miss = np.linalg.norm(errors[-1][:3])
