@@ -114,6 +114,7 @@ class FiniteHorizonParameters(QuadraticWeights):
         3000.0,
         unit="s",
         above=0.0,
+        maximum=1e5,
         in_flight=True,
         doc="time of a reconfiguration, from where the law takes over or the target leaps",
     )
@@ -225,8 +226,8 @@ class FiniteHorizonController(Controller):
         }
 
     def take_over(self, handover: Handover) -> None:
-        """Go on with the reconfiguration of a law of the same kind."""
-        if isinstance(handover.law, type(self)):
+        """Go on with the reconfiguration of the same law with other parameters."""
+        if type(handover.law) is type(self):
             self._flight, self._target = handover.law._flight, handover.law._target
 
     def command(self, estimate: Estimate, target: Target) -> Command:
@@ -272,6 +273,10 @@ class FiniteHorizonController(Controller):
     def _answer(self, flight: _Flight, estimate: Estimate, target: Target, to_go: float) -> Plan:
         """A plan for what is left, with its failure named."""
         nothing = np.zeros((1, 3))
+        if not 0.0 < estimate.mass < math.inf:
+            return Plan(
+                nothing, to_go, 0, f"no plan: mass is {estimate.mass:g} kg; it must be positive and finite"
+            )
         steps = max(1, math.ceil(to_go / self._parameters.step - 1e-9))
         if steps > MOST_STEPS:
             return Plan(nothing, to_go, 0, f"{steps} steps to plan, at most {MOST_STEPS} allowed")
@@ -295,9 +300,9 @@ class FiniteHorizonController(Controller):
             return Plan(nothing, to_go, plan.iterations, f"no plan: {plan.failure}")
         if not np.isfinite(plan.acceleration).all():
             return Plan(nothing, to_go, plan.iterations, "no plan: it is not finite")
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             asked = np.nanmax(estimate.mass * np.abs(plan.acceleration).max(axis=0) / self._limit)
-        if asked > 1.0:
+        if not asked <= 1.0:
             failure = f"no plan: final_time is too short: {asked:.3g} times the thrust limit is asked"
             return Plan(nothing, to_go, plan.iterations, failure)
         return plan

@@ -1,6 +1,5 @@
 """What holds for every law in the registry, whatever comes in."""
 
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from formation_gnc.control.autopilot import Autopilot, ControllerParameters
+from formation_gnc.control.finite_horizon import FiniteHorizonController
 from formation_gnc.control.registry import ALGORITHMS
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.parameters import load
@@ -17,12 +17,15 @@ from formation_gnc.parameters import load
 CHIEF = state_from_elements(Elements(6978100.0, 0.0, 1.48, 0.0, 0.0, 0.0))
 LIMIT = np.array([0.01, 0.02, 0.0])
 """N; and one axis that cannot push."""
+STRONG = np.full(3, 50.0)
+"""N: plans to go some kilometres in 300 s ask less."""
+FINITE_HORIZONS = [name for name, law in ALGORITHMS.items() if issubclass(law, FiniteHorizonController)]
 
 
 def autopilot(algorithm: str, **values: Any) -> Autopilot:
     basis = {"chief.semi_major_axis": 6978100.0, "tick": 10.0, "thrust_limit": tuple(LIMIT)}
     own = {key.replace("__", "."): value for key, value in values.items()}
-    if "final_time" in {field.name for field in fields(ALGORITHMS[algorithm].Parameters)}:
+    if algorithm in FINITE_HORIZONS:
         own[f"{algorithm}.final_time"] = 300.0  # short plans are soon made
     return Autopilot("controller", load(ControllerParameters, {"algorithm": algorithm} | basis | own))
 
@@ -50,9 +53,10 @@ def ticks(draw: Any) -> dict[str, Any]:
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 @settings(deadline=None, max_examples=12)
-@given(flight=st.lists(ticks(), min_size=1, max_size=4))
-def test_a_command_is_never_nan_and_never_above_the_limit(algorithm, flight, estimate, target):
-    pilot = autopilot(algorithm, mpc__keep_out_radius=20.0, mpc__off_in_eclipse=True, mpc__horizon=40)
+@given(flight=st.lists(ticks(), min_size=1, max_size=4), limit=st.sampled_from([LIMIT, STRONG]))
+def test_a_command_is_never_nan_and_never_above_the_limit(algorithm, flight, limit, estimate, target):
+    mpc = {"mpc__keep_out_radius": 20.0, "mpc__off_in_eclipse": True, "mpc__horizon": 40}
+    pilot = autopilot(algorithm, thrust_limit=tuple(limit), **mpc)
     for tick, each in enumerate(flight):
         seen = estimate(each["state"], 10.0 * tick, each["mass"], each["chief"])
         aim = target(
@@ -64,11 +68,26 @@ def test_a_command_is_never_nan_and_never_above_the_limit(algorithm, flight, est
         )
         thrust, status = pilot.on_tick(seen, aim)
         assert np.isfinite(thrust.force).all()
-        assert (np.abs(thrust.force) <= LIMIT).all()
+        assert (np.abs(thrust.force) <= limit).all()
         assert np.isfinite(status.demand).all()
         if not np.isfinite(each["state"]).all():
             assert not thrust.force.any()
             assert status.fallback == "estimate not finite: no thrust"
+
+
+places, speeds = (st.tuples(*[st.floats(-size, size)] * 3) for size in (1e3, 1.0))
+
+
+@pytest.mark.parametrize("algorithm", FINITE_HORIZONS)
+@settings(deadline=None, max_examples=12)
+@given(place=places, speed=speeds, goal=places)
+def test_a_sane_reconfiguration_is_planned_and_flown(algorithm, place, speed, goal, estimate, target):
+    pilot = autopilot(algorithm, thrust_limit=tuple(STRONG))
+    for time, solver in ((0.0, "planned"), (10.0, "following")):
+        seen, aim = estimate([*place, *speed], time, chief=CHIEF), target([*goal, 0.0, 0.0, 0.0], time)
+        thrust, status = pilot.on_tick(seen, aim)
+        assert (status.solver, status.fallback) == (solver, "")
+        np.testing.assert_array_equal(thrust.force, status.demand)
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)

@@ -17,13 +17,16 @@ from formation_gnc.control.finite_horizon import (
     leaps,
     target_after,
 )
+from formation_gnc.control.registry import ALGORITHMS
 from formation_gnc.errors import DesignError
 from formation_gnc.guidance.relative_orbit import RelativeOrbit, RelativeOrbitParameters
+from formation_gnc.interface import NANOSECONDS
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.relative.chief import KeplerChief
 from formation_gnc.relative.nonlinear import NonlinearModel
 
 CHIEF = state_from_elements(Elements(6978100.0, 0.0, 1.48, 0.0, 0.0, 0.0))
+FINITE_HORIZONS = [law for law in ALGORITHMS.values() if issubclass(law, FiniteHorizonController)]
 PARAMETERS = FiniteHorizonParameters(final_time=1000.0, step=50.0, replan_interval=200.0, last_plan=300.0)
 
 
@@ -102,6 +105,27 @@ def test_a_plan_that_does_not_count_is_named_and_another_law_flies(
     assert words in commands[-1].fallback
     assert commands[-1].fallback.endswith("the plan before flies on")
     np.testing.assert_allclose(commands[-1].force, [0.005, 0, 0])
+
+
+@pytest.mark.parametrize("mass", [np.nan, np.inf, 0.0, -100.0])
+def test_a_mass_that_none_has_is_named(mass, mission, vehicle, estimate, target):
+    command = Told(mission, vehicle, np.array([2e-4, 0, 0])).command(  # twice the limit
+        estimate([5.0, 0, 0, 0, 0, 0], mass=mass, chief=CHIEF), target()
+    )
+    assert command.fallback == f"no plan: mass is {mass:g} kg; it must be positive and finite; LQR flies"
+
+
+@pytest.mark.parametrize("before", FINITE_HORIZONS)
+@pytest.mark.parametrize("after", FINITE_HORIZONS)
+def test_a_swap_begins_a_reconfiguration_and_new_parameters_go_on(
+    before, after, mission, vehicle, estimate, target
+):
+    old, new = (law(law.Parameters(final_time=500.0, step=50.0), mission, vehicle) for law in (before, after))
+    seen = estimate([1.0, 0, 0, 0, 0, 0], chief=CHIEF)
+    assert old.command(seen, target()).solver == "planned"
+    new.take_over(Handover(np.zeros(3), "before", old))
+    later = dataclasses.replace(seen, time=10 * NANOSECONDS)
+    assert new.command(later, target(time=10.0)).solver == ("following" if before is after else "planned")
 
 
 def test_a_chief_on_no_orbit_is_named(mission, vehicle, estimate, target):
