@@ -24,7 +24,7 @@ FEWEST_TICKS = 5
 """Of the identification time: what follows from continuous time is stepped by Euler's method."""
 
 FARTHEST = 1e12
-"""Error, m, that nobody flies, and beyond which products overflow."""
+"""Error, m or m/s, that nobody flies, and that would undo what was learnt."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class AdaptiveLinearQuadraticRegulator(Controller):
     free orbit. The other learns lambda. The law starts as LQR.
 
     While a thruster is at its limit, lambda is not learnt. When a weight blows up, LQR flies alone from then
-    on, and the command says so.
+    on, and the command says so; an error beyond `FARTHEST` is LQR's alone for as long as it is there.
 
     Assumes: what is left out changes slowly against `identification_time`, or with the chief's revolution.
     """
@@ -127,16 +127,20 @@ class AdaptiveLinearQuadraticRegulator(Controller):
 
     def command(self, estimate: Estimate, target: Target) -> Command:
         """The force of the regulator and the networks, which learn from this tick."""
-        error = (estimate.relative_state - target.relative_state) / self._state_unit
-        if not self._failure:
+        offset = estimate.relative_state - target.relative_state
+        error, reason = offset / self._state_unit, self._failure
+        if not np.abs(offset).max() < FARTHEST:
+            reason = reason or "adaptive_lqr: the error is out of any range; LQR flies"
+        elif not reason:
             thrust = self._learn(estimate, target, error)
             largest = self.networks.largest_weight
             if not (largest <= LARGEST_WEIGHT and np.isfinite(thrust).all()):
-                self._failure = f"adaptive_lqr: network weights have blown up to {largest:.3g}; LQR flies"
-        if self._failure:
+                reason = f"adaptive_lqr: network weights have blown up to {largest:.3g}; LQR flies"
+                self._failure = reason
+        if reason:
             thrust = self._regulator.thrust(error, np.zeros(6))
-        self._target = target
-        return Command(estimate.mass * self._input_unit * thrust, fallback=self._failure)
+        self._target = None if reason else target  # none: the virtual deputy has stayed behind
+        return Command(estimate.mass * self._input_unit * thrust, fallback=reason)
 
     def _learn(self, estimate: Estimate, target: Target, error: Vector) -> Vector:
         """Scaled thrust, with the networks corrected by what the last one did."""

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.linalg import solve_continuous_are
 
 from formation_gnc.control.adaptive_lqr import (
+    FARTHEST,
     LARGEST_WEIGHT,
     AdaptiveLinearQuadraticRegulator,
     AdaptiveLqrParameters,
@@ -157,6 +158,24 @@ def test_weights_that_blow_up_are_named_and_lqr_flies_from_then_on(
     new = law()
     new.take_over(Handover(np.zeros(3), "adaptive_lqr", flying))
     assert not new.command(estimate(state), target()).fallback
+
+
+def test_an_estimate_out_of_any_range_undoes_nothing(law, mission, vehicle, estimate, target):
+    flying, push = law(), np.array([2e-6, -1e-6, 1e-6])
+    state = fly(flying, HillModel(mission.mean_motion), estimate, target, np.zeros(6), 300, push)[0][-1]
+    known = flying.networks.model_weights
+    far = np.full(6, 10.0 * FARTHEST)
+    plain = LinearQuadraticRegulator(LqrParameters(gain="continuous", **ROBERTS), mission, vehicle)
+    command = flying.command(estimate(far, 3000.0), target(time=3000.0))
+    assert command.fallback == "adaptive_lqr: the error is out of any range; LQR flies"
+    np.testing.assert_allclose(command.force, plain.command(estimate(far), target()).force, rtol=1e-9)
+    np.testing.assert_array_equal(flying.networks.model_weights, known)
+    command = flying.command(estimate(state, 3010.0), target(time=3010.0))
+    assert not command.fallback
+    np.testing.assert_array_equal(flying.networks.model_weights, known)  # met anew: nothing to learn from yet
+    with np.errstate(all="ignore"):
+        plain_force = plain.command(estimate(state), target()).force
+    assert np.linalg.norm(command.force - plain_force) > 1e-5  # what it knew is flown
 
 
 def test_new_parameters_keep_what_was_learnt(law, mission, estimate, target):
