@@ -166,6 +166,7 @@ class Guide(Part[Any, TargetPath]):
         """Nothing has been looked for yet, eclipses or others that come near."""
         self._eclipse, self._eclipse_due = NO_ECLIPSE, NEVER
         self._predicted, self._warned = NEVER, False
+        self._waits_for = ""
         self._known: Mapping[str, Estimate | Neighbour] = {}
 
     def design(self, parameters: Any) -> TargetPath:
@@ -259,7 +260,6 @@ class Guide(Part[Any, TargetPath]):
             if each is not None and _is_near(each)
         }
         if self._unassigned:
-            self._unassigned = False
             self._take_place(estimate, known)
         times = estimate.time / NANOSECONDS + _ahead(
             self.parameters.preview_step, self.parameters.preview_steps
@@ -287,8 +287,11 @@ class Guide(Part[Any, TargetPath]):
         silent = [name for name in parameters.fleet if name not in fleet]
         if silent or not _is_near(estimate):
             who = ", ".join(silent) or self._deputy
-            self.record(estimate.time, "warning", f"no state of {who}: places stay as they are")
+            if who != self._waits_for:
+                self._waits_for = who
+                self.record(estimate.time, "warning", f"no state of {who}: places stay until there is")
             return
+        self._unassigned, self._waits_for = False, ""
         states = np.array([fleet[name].relative_state for name in parameters.fleet])
         masses = np.array([fleet[name].mass for name in parameters.fleet])
         shared = share_out(parameters, estimate.time / NANOSECONDS, states, masses)
@@ -385,8 +388,8 @@ def _ahead(step: float, steps: int) -> Vector:
 
 
 def _is_near(estimate: Estimate | Neighbour) -> bool:
-    """Whether a state is finite, and one that a satellite in formation can have."""
-    return bool((np.abs(estimate.relative_state) < OUT_OF_REACH).all())
+    """Whether state and mass are finite, and such as a satellite in formation can have."""
+    return bool((np.abs(estimate.relative_state) < OUT_OF_REACH).all() and 0.0 < estimate.mass < math.inf)
 
 
 def _check_assignment(parameters: Any) -> None:

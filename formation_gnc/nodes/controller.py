@@ -3,8 +3,8 @@
 from formation_gnc.control.autopilot import Autopilot, ControllerParameters
 from formation_gnc.interface import Estimate, Status, Target, Thrust
 from formation_gnc.nodes import topics
-from formation_gnc.nodes.meeting import Wires
 from formation_gnc.nodes.shell import PartNode, run
+from formation_gnc.nodes.wires import Wires
 
 
 class ControllerNode(PartNode[Autopilot]):

@@ -3,8 +3,8 @@
 from formation_gnc.guidance.guide import GuidanceParameters, Guide
 from formation_gnc.interface import Estimate, Neighbour, Separation, Target
 from formation_gnc.nodes import topics
-from formation_gnc.nodes.meeting import Wires
 from formation_gnc.nodes.shell import PartNode, run
+from formation_gnc.nodes.wires import Wires
 
 
 class GuidanceNode(PartNode[Guide]):

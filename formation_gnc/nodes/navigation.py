@@ -3,8 +3,8 @@
 from formation_gnc.interface import Estimate, Measurement
 from formation_gnc.navigation.navigator import NavigationParameters, Navigator
 from formation_gnc.nodes import topics
-from formation_gnc.nodes.meeting import Wires
 from formation_gnc.nodes.shell import PartNode, run
+from formation_gnc.nodes.wires import Wires
 
 
 class NavigationNode(PartNode[Navigator]):

@@ -6,9 +6,9 @@ from hand to hand.
 
 from formation_gnc.nodes.controller import ControllerNode
 from formation_gnc.nodes.guidance import GuidanceNode
-from formation_gnc.nodes.meeting import Wires
 from formation_gnc.nodes.navigation import NavigationNode
 from formation_gnc.nodes.shell import run, serve
+from formation_gnc.nodes.wires import Wires
 
 
 class Satellite:

@@ -29,9 +29,10 @@ except ImportError:  # other builds of Jazzy do not have it; theirs is slower an
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.interface import Estimate, Event, Timing
+from formation_gnc.meeting import Meeting
 from formation_gnc.nodes import topics
 from formation_gnc.nodes.conversion import blank, from_message, message_type, neighbour, to_message
-from formation_gnc.nodes.meeting import Meeting, Wires
+from formation_gnc.nodes.wires import Wires
 from formation_gnc.orbit.propagation import ImpactError
 from formation_gnc.parameters import OWN_OF_ROS, Leaf, dump, leaves, load, read_yaml
 from formation_gnc.part import Part

@@ -19,6 +19,7 @@ from formation_gnc.control.autopilot import Autopilot, ControllerParameters
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.guidance.guide import GuidanceParameters, Guide
 from formation_gnc.interface import EstimateStatus, Event, Timing
+from formation_gnc.meeting import Meeting
 from formation_gnc.navigation.navigator import NavigationParameters, Navigator
 from formation_gnc.parameters import OWN_OF_ROS, dump, leaves, load, read_yaml
 from formation_gnc.part import Part, scheduled, text_of
@@ -71,6 +72,15 @@ class ReplayedPart:
         """Begin anew, as a process that was just started."""
         self._part: Part[Any, Any] = self.kind.build(self.node, self.parameters)
         self._foreseen = sorted(map(scheduled, self.parameters.schedule), key=lambda entry: entry[0])
+        self._meeting = Meeting((*self.inputs, *self.others), len(self.inputs))
+
+    def meet(self, records: Mapping[str, Any]) -> list[Any] | None:
+        """Its inputs at a tick, of the records there are by topic; none when it could not answer."""
+        inputs = None
+        for topic in (*self.others, *reversed(self.inputs)):  # who sets the pace comes last
+            if topic in records:
+                inputs = self._meeting.take(topic, records[topic])
+        return inputs
 
     def tick(self, time: int, inputs: list[Any], swaps: list[Event]) -> tuple[tuple[Any, ...], list[Event]]:
         """Outputs, none while there is no state, and events of a tick on which `swaps` were recorded."""
@@ -200,19 +210,22 @@ def _fly_tick(
                 copy(topic, data, time)
     said: dict[str, Any] = {}
     for part in parts:
-        inputs = [
-            said.get(topic) if topic in outputs else read(topic, tick[topic][-1]) if topic in tick else None
+        there = {
+            topic: said[topic] if topic in outputs else read(topic, tick[topic][-1])
             for topic in (*part.inputs, *part.others)
-        ]
+            if topic in (said if topic in outputs else tick)
+        }
         timing = _sibling(part.node, "timing")
         is_timed = timing in bag.topics and bag.topics[timing].count > 0
         output = _sibling(part.node, part.kind.outputs[0])
         recorded = read(output, tick[output][-1]) if output in tick else None
         if _sibling(part.node, "measurement") not in tick:
             continue  # no tick of this deputy
-        if not part.heard(time, part.node in timed or not is_timed, recorded):
-            continue
-        if any(each is None for each in inputs[: len(part.inputs)]):
+        # A node that was killed may have answered without the time to say how long it took.
+        answered = part.node in timed or not is_timed or recorded is not None
+        is_heard = part.heard(time, answered, recorded)
+        inputs = part.meet(there)  # even when it was silent: who is waited for next depends on it
+        if not is_heard or inputs is None:
             continue
         started = perf_counter()
         records, events = part.tick(time, inputs, swaps.get(part.node, []))

@@ -6,6 +6,7 @@ from typing import Any
 from formation_gnc.control.autopilot import Autopilot
 from formation_gnc.guidance.guide import Guide
 from formation_gnc.interface import Estimate, Event, Thrust, Vector
+from formation_gnc.meeting import Meeting
 from formation_gnc.navigation.navigator import Navigator
 from formation_gnc.part import Part
 from formation_gnc.plant.plant import Plant
@@ -25,17 +26,21 @@ class Satellite:
         self.navigator = Navigator(f"/{name}/navigation", setup.navigation)
         self.guide = Guide(f"/{name}/guidance", setup.guidance)
         self.autopilot = Autopilot(f"/{name}/controller", setup.controller)
+        self._meeting = Meeting((name, *self.guide.others), needed=1)
         self.parts: tuple[Part[Any, Any], ...] = (self.navigator, self.guide, self.autopilot)
 
     def on_tick(self, estimates: Mapping[str, Estimate | None], sink: Sink) -> Thrust | None:
-        """From the estimates of all deputies to thrust; none when there is no estimate to act on."""
-        estimate, thrust = estimates[self.name], None
+        """From the estimates of all deputies to thrust; none when there is nothing to act on."""
+        estimate, records, thrust = estimates[self.name], None, None
+        for name in (*self.guide.others, self.name):
+            if (each := estimates[name]) is not None:
+                records = self._meeting.take(name, each)
         if estimate is not None:
-            others = [estimates[name] for name in self.guide.others]
-            target, separation = self.guide.on_tick(estimate, *others)
+            sink(f"/{self.name}/estimate", estimate)
+        if estimate is not None and records is not None:
+            target, separation = self.guide.on_tick(*records)
             thrust, status = self.autopilot.on_tick(estimate, target)
             for topic, record in (
-                ("estimate", estimate),
                 ("target", target),
                 ("separation", separation),
                 ("thrust", thrust),

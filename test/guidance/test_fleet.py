@@ -173,13 +173,18 @@ def test_with_fuel_who_has_little_left_goes_the_shorter_way() -> None:
     assert places("fuel", (90.0, 99.0)) == [1, 0]  # an empty tank counts as nearly empty
 
 
-def test_without_a_state_of_everybody_places_stay() -> None:
+def test_places_stay_until_there_is_a_state_of_everybody() -> None:
     guide = Guide("/deputy1/guidance", parameters(assignment="delta_v", slot=2))
     states = on_the_ring(0.0)
     guide.on_tick(estimate(states[0]), estimate(states[1]), None, estimate(states[3]))
     assert guide.parameters.slot == 2
+    guide.on_tick(estimate(states[0], 1.0), estimate(states[1], 1.0), None, estimate(states[3], 1.0))
     (event,) = guide.take_events()
     assert (event.kind, "deputy3" in event.detail) == ("warning", True)
+    guide.on_tick(estimate(states[0], 2.0), *(estimate(state, 2.0) for state in states[1:]))
+    assert [event.kind for event in guide.take_events()] == ["assignment"]
+    guide.on_tick(estimate(states[0], 3.0), *(estimate(state, 3.0) for state in states[1:]))
+    assert guide.take_events() == []
 
 
 @pytest.mark.parametrize("state", [np.full(6, np.nan), np.full(6, 1e200), np.full(6, -np.inf)])

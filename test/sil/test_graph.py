@@ -130,6 +130,7 @@ def test_two_rounds_of_laws_under_load_miss_no_tick_and_step_no_further_than_the
     for law in laws[1:]:
         accepted, reason = set_parameter(desk, "/deputy1/controller", "algorithm", law)
         assert accepted, reason
+    wait_until(lambda: terminals["controller"].text.count(" handover: ") == 8, "the last hand-over")
     assert plant.process.poll() is None, "the flight was too short for all swaps"
     for terminal in (plant, *terminals.values(), desk.terminals[0]):
         terminal.signal(signal.SIGINT)

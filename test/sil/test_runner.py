@@ -300,3 +300,20 @@ if __name__ == "__main__":
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(table[0])
         writer.writerows([f"{value:.12g}" for value in row.values()] for row in table)
+
+
+def test_a_satellite_without_an_estimate_costs_its_fleet_a_tick_as_on_the_graph(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    run = Run(load_scenario("tetrahedral"))
+    silent = run.satellites[1].navigator
+    answer = silent.on_tick
+    monkeypatch.setattr(silent, "on_tick", lambda seen: None if run.plant.tick == 3 else answer(seen))
+    records: dict[str, list[Any]] = {}
+    for _ in range(7):
+        run.tick(lambda topic, record: records.setdefault(topic, []).append(record))
+    for name in ("deputy1", "deputy3", "deputy4"):
+        assert len(records[f"/{name}/estimate"]) == 7
+        flown = {each.time // NANOSECONDS: len(each.others) for each in records[f"/{name}/target"]}
+        assert flown == {0: 3, 1: 3, 2: 3, 4: 2, 5: 3, 6: 3}
+    assert run.misses == 4

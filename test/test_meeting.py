@@ -5,7 +5,8 @@ from itertools import permutations
 
 import pytest
 
-from formation_gnc.nodes.meeting import Meeting, Wires
+from formation_gnc.meeting import Meeting
+from formation_gnc.nodes.wires import Wires
 
 OWN, SECOND, THIRD = "estimate", "/deputy2/estimate", "/deputy3/estimate"
 
@@ -51,6 +52,15 @@ def test_who_speaks_again_is_waited_for_again(fleet: Meeting) -> None:
     assert answers(fleet, (OWN, 30), (SECOND, 30)) == [[30, 30, None]]
     assert answers(fleet, (THIRD, 30), (OWN, 40), (SECOND, 40)) == []
     assert answers(fleet, (THIRD, 40)) == [[40, 40, 40]]
+
+
+@pytest.mark.parametrize("order", list(permutations((OWN, SECOND, THIRD))))
+def test_the_tick_after_a_silence_does_not_hang_on_the_order_either(
+    fleet: Meeting, order: tuple[str, ...]
+) -> None:
+    answers(fleet, (OWN, 10), (SECOND, 10), (THIRD, 10), (OWN, 20), (THIRD, 20))
+    assert answers(fleet, *((topic, 30) for topic in order)) == [[30, None, 30]]
+    assert answers(fleet, *((topic, 40) for topic in order)) == [[40, 40, 40]]
 
 
 def test_what_is_needed_is_never_done_without() -> None:
