@@ -41,8 +41,9 @@ ECLIPSE_STEPS = 180
 NEVER = -LAST_SECOND * NANOSECONDS
 """Time (ns) long before every run."""
 
-TAKEN = 1.0
-"""Distance (m), with a rate of as much a radian, within which another satellite has a place at least."""
+TAKEN = 0.05
+"""Distance, with a rate of as much a radian, within which another satellite has a place at least, as a share
+of the formation's size: more than control leaves, less than places are apart."""
 
 OUT_OF_REACH = 1e9
 """Distance (m) from the chief that is no formation any more."""
@@ -214,7 +215,8 @@ class Guide(Part[Any, TargetPath]):
     def _check_that_nobody_is_there(self, prepared: Configuration[Any, TargetPath]) -> None:
         """Refuse a target that another of the fleet holds."""
         now = np.array([self._time / NANOSECONDS])
-        target, room = prepared.design.states(now)[0], max(TAKEN, prepared.parameters.separation_warning)
+        target, (_, size) = prepared.design.states(now)[0], prepared.design.error()
+        room = max(TAKEN * size, prepared.parameters.separation_warning)
         if np.array_equal(target, self.configuration.design.states(now)[0]):
             return
         reach = room * np.repeat([1.0, prepared.parameters.mean_motion], 3)

@@ -248,6 +248,10 @@ def test_a_place_that_another_holds_is_refused_in_flight_and_the_target_stays() 
     with pytest.raises(ConfigurationError, match="deputy3 is there"):
         guide.prepare({"slot": 2})
     assert guide.parameters.slot == 0
+    off = states + np.array([2.0, -3.0, 2.0, 0.001, 0.002, -0.001])  # as control keeps it
+    guide.on_tick(*(estimate(state, 0.5) for state in off))
+    with pytest.raises(ConfigurationError, match="deputy3 is there"):
+        guide.prepare({"slot": 2})
     guide.prepare({"slot": 2, "projected_circular_orbit.size": 1500.0})
     states[2, 3:] *= -1.0  # passes through, and does not hold it
     guide.on_tick(*(estimate(state, 1.0) for state in states))
