@@ -12,8 +12,10 @@ import pytest
 
 from formation_gnc.analysis.compare import gnc_topics
 from formation_gnc.cli import main
+from formation_gnc.interface import NANOSECONDS
 from formation_gnc.nodes.record_in_process import reader
 from formation_gnc.recording.reader import Bag, identical, read
+from formation_gnc.recording.writer import BagWriter, TopicDefinition
 from formation_gnc.sil.replay import KINDS, nodes_of, parameters_of, replay
 from formation_gnc.sil.scenario import find_scenario, load_scenario
 
@@ -170,6 +172,26 @@ def test_swaps_by_schedule_and_by_hand_are_flown_again_at_their_tick(
     forces = np.array([record.force for topic, record in outputs if topic == "/deputy1/thrust"])
     assert forces.tobytes() == recorded.arrays("/deputy1/thrust")["force"].tobytes()
     assert not {topic for topic, _ in said} & {topic for topic, _ in outputs if topic != "/events"}
+
+
+def test_an_answer_to_what_the_bag_lacks_is_taken_as_recorded_and_told(
+    flown: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole = Bag(flown)
+    with BagWriter(tmp_path / "lacking", whole.metadata) as writer:
+        for topic in whole.topics:
+            schema, channel = whole.definition(topic)
+            assert schema is not None
+            writer.add_defined_topic(
+                topic, TopicDefinition(schema.name, schema.data, metadata=channel.metadata)
+            )
+        for topic, data, stamp in whole.messages():
+            if (topic, stamp) != ("/deputy1/estimate", 50 * NANOSECONDS):
+                writer.write(topic, data, stamp, 2)
+    status, again = replayed(tmp_path / "lacking", tmp_path / "again", "--nodes", "guidance,controller")
+    assert status == 0
+    assert "2 answers as recorded" in capsys.readouterr().out
+    assert again.topics["/deputy1/thrust"].count == whole.topics["/deputy1/thrust"].count
 
 
 def test_a_changed_replay_differs_where_it_was_changed_and_only_there(

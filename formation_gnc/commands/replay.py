@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     origin = {"replay": {"source": source.name, "nodes": ", ".join(parameters)}}
     with BagWriter(output, bag.metadata | provenance() | flown | origin, bag.attachments) as writer:
         recorder = InProcessRecorder(writer)
-        replay(
+        orphans = replay(
             bag,
             parameters,
             reader(bag),
@@ -65,6 +65,8 @@ def run(options: argparse.Namespace) -> int:
             lambda topic, data, stamp: recorder.copy(bag, topic, data, stamp),
         )
     print(f"bag: {output}")
+    if orphans:
+        print(f"{orphans} answers as recorded, not flown: the bag lacks what they answer")
     replayed = Bag(output)
     differences = identical(bag, replayed, gnc_topics(bag, replayed))
     for difference in differences:

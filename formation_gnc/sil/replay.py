@@ -65,6 +65,8 @@ class ReplayedPart:
         fleet = getattr(self.parameters, "fleet", ())
         self.others = [f"/{name}/estimate" for name in fleet if name != deputy]
         """Inputs that may be missing."""
+        self.orphans = 0
+        """Ticks whose input the bag lacks though it was answered."""
         self._heard_last = True
         self.start()
 
@@ -142,7 +144,7 @@ def nodes_of(bag: Bag, kinds: Collection[str]) -> list[str]:
     return [f"/{deputy}/{kind}" for kind in KINDS if kind in kinds for deputy in deputies]
 
 
-def replay(bag: Bag, parameters: Mapping[str, Mapping[str, Any]], read: Read, sink: Sink, copy: Copy) -> None:
+def replay(bag: Bag, parameters: Mapping[str, Mapping[str, Any]], read: Read, sink: Sink, copy: Copy) -> int:
     """Fly a bag's inputs through parts again, tick by tick.
 
     Args:
@@ -151,6 +153,9 @@ def replay(bag: Bag, parameters: Mapping[str, Mapping[str, Any]], read: Read, si
         read: makes records of messages.
         sink: takes topic and record of all that the parts say.
         copy: takes every other message as it was recorded, sorted by stamp.
+
+    Returns:
+        How many answers are as recorded, not flown, since the bag lacks what they answer.
 
     Raises:
         ConfigurationError: parameters that cannot be flown, or a recorded change that these do not allow.
@@ -178,6 +183,7 @@ def replay(bag: Bag, parameters: Mapping[str, Mapping[str, Any]], read: Read, si
         tick[topic] = messages
     if time is not None:
         _fly_tick(bag, parts, outputs, time, tick, read, sink, copy)
+    return sum(part.orphans for part in parts)
 
 
 def _fly_tick(
@@ -225,6 +231,14 @@ def _fly_tick(
         answered = part.node in timed or not is_timed or recorded is not None
         is_heard = part.heard(time, answered, recorded)
         inputs = part.meet(there)  # even when it was silent: who is waited for next depends on it
+        if inputs is None and recorded is not None:
+            # A node that was killed may have reached others with what the recorder never got.
+            for topic in (_sibling(part.node, name) for name in part.kind.outputs):
+                for data in tick.get(topic, ()):
+                    said[topic] = read(topic, data)
+                    copy(topic, data, time)
+            part.orphans += 1
+            continue
         if not is_heard or inputs is None:
             continue
         started = perf_counter()
