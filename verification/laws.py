@@ -17,11 +17,10 @@ from typing import Any
 import numpy as np
 
 from formation_gnc.control.registry import ALGORITHMS
-from formation_gnc.interface import Estimate, EstimateStatus, Measurement
-from formation_gnc.plant.plant import Plant
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import find_scenario, load_scenario
 from verification.figure import TABLE, Figure
+from verification.omniscient import Omniscient
 
 SCENARIOS = find_scenario("leader_follower").parent
 EXPECTED = Path(__file__).with_name("laws.csv")
@@ -41,31 +40,6 @@ LAWS: dict[str, dict[str, dict[str, Any]]] = {
     "hinf, full information": {"/**/controller": {"algorithm": "hinf", "hinf.form": "full_information"}},
 }
 """What is changed of a scenario: all algorithms, and some with other parameters."""
-
-
-class Omniscient:
-    """Stands where the navigation does, and gives the truth as the estimate."""
-
-    def __init__(self, plant: Plant, name: str) -> None:
-        """For a deputy of this plant."""
-        self._plant, self._index = plant, plant.parameters.deputies.index(name)
-
-    def on_tick(self, measurement: Measurement) -> Estimate:
-        """The true state at the tick."""
-        deputy = self._plant.truth().deputies[self._index]
-        return Estimate(
-            time=measurement.time,
-            relative_state=deputy.relative_state,
-            covariance=np.zeros((6, 6)),
-            chief_state=measurement.chief_state,
-            mass=measurement.mass,
-            eclipse=measurement.eclipse,
-            sensor=[],
-            innovation=[],
-            innovation_sigma=[],
-            nis=0.0,
-            status=EstimateStatus.TRACKING,
-        )
 
 
 class Clocked:

@@ -28,6 +28,7 @@ from formation_gnc.orbit.frames import hill_transform
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
 from verification.figure import Figure, failures
+from verification.omniscient import Omniscient
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
@@ -557,46 +558,19 @@ def _plot_troubles(path: Path, tick: float, error: Array, sigma: Array, outage: 
     plt.close(figure)
 
 
-class _Oracle:
-    """In the navigator's place: the truth."""
-
-    def __init__(self, run: Run) -> None:
-        self._run, self._inner = run, run.satellites[0].navigator
-        self.truth = START
-
-    def on_tick(self, measurement: Measurement) -> Estimate:
-        return Estimate(
-            time=measurement.time,
-            relative_state=self.truth,
-            covariance=np.zeros((6, 6)),
-            chief_state=measurement.chief_state,
-            mass=measurement.mass,
-            eclipse=measurement.eclipse,
-            sensor=[],
-            innovation=[],
-            innovation_sigma=[],
-            nis=0.0,
-            status=0,
-        )
-
-
 def closed_loop(directory: Path) -> tuple[str, list[Figure]]:
     """Point 5: the default scenario on estimates, and on the truth."""
     scenario = load_scenario("leader_follower")
     results = {}
     for name in ("filter", "truth"):
         run = Run(scenario)
-        oracle = _Oracle(run)
         if name == "truth":
-            run.satellites[0].navigator = oracle  # type: ignore[assignment]
+            run.satellites[0].navigator = Omniscient(run.plant, "deputy1")  # type: ignore[assignment]
         records: dict[str, list[Any]] = {"truth": [], "target": [], "thrust": []}
 
-        def sink(
-            topic: str, record: Any, records: dict[str, list[Any]] = records, oracle: _Oracle = oracle
-        ) -> None:
+        def sink(topic: str, record: Any, records: dict[str, list[Any]] = records) -> None:
             if topic == "/truth":
-                oracle.truth = record.deputies[0].relative_state
-                records["truth"].append(oracle.truth)
+                records["truth"].append(record.deputies[0].relative_state)
             elif topic.endswith("target"):
                 records["target"].append(record.relative_state)
             elif topic.endswith("thrust"):

@@ -5,10 +5,10 @@ from math import sumprod
 from typing import Any
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
 from formation_gnc.control.feed_forward import FeedForward
+from formation_gnc.control.integral import IntegralWeights, integrated, with_integral
 from formation_gnc.control.linear import LinearController
 from formation_gnc.control.models import DESIGN_MODELS
 from formation_gnc.control.riccati import (
@@ -18,7 +18,6 @@ from formation_gnc.control.riccati import (
     periodic_gains,
     stationary_gain,
 )
-from formation_gnc.control.weights import QuadraticWeights
 from formation_gnc.errors import DesignError
 from formation_gnc.interface import NANOSECONDS, Estimate, Matrix, Target
 from formation_gnc.mission import Mission
@@ -34,7 +33,7 @@ MOST_STEPS = 50_000
 
 
 @dataclass(frozen=True)
-class LqrParameters(QuadraticWeights):
+class LqrParameters(IntegralWeights):
     """Weights, model, and which gain."""
 
     model: str = parameter(
@@ -55,13 +54,6 @@ class LqrParameters(QuadraticWeights):
     )
     terminal_weight: float = parameter(
         1.0, minimum=0.0, in_flight=True, doc="state weight at the final time over that of one tick"
-    )
-    integral_error: float = parameter(
-        0.0,
-        unit="m s",
-        minimum=0.0,
-        in_flight=True,
-        doc="integral of position error that weighs one; 0 for no integral",
     )
     feed_forward: str = parameter(
         "none",
@@ -97,14 +89,14 @@ class LinearQuadraticRegulator(Controller):
         model = DESIGN_MODELS[parameters.model](mission)
         self.tick = mission.tick
         self._limit, self._mass = vehicle.thrust_limit.tolist(), vehicle.mass
-        self._integrates = parameters.integral_error > 0.0
+        self._integrates = parameters.integrates
         self._feed_forward = FeedForward(parameters.feed_forward, model)
         self._integral = [0.0, 0.0, 0.0] if self._integrates else []
         self._start: int | None = None
         try:
             thrust_weight = vehicle.mass**2 * parameters.thrust_matrix()
             self._design(
-                parameters, model, Weights.scaled(_with_integral(parameters), thrust_weight, self.tick)
+                parameters, model, Weights.scaled(parameters.joint_matrix(), thrust_weight, self.tick)
             )
         except DesignError as error:
             raise DesignError(f"lqr: {error}") from error
@@ -131,7 +123,10 @@ class LinearQuadraticRegulator(Controller):
                 self.gains = periodic_gains(models, max(1, round(self.interval / tick)), weights)
             self.gain = self.gains.mean(axis=0)
         elif parameters.gain == "continuous":
-            self.gain = continuous_gain(*self._augmented(model.dynamics(0.0), model.INPUT), weights)
+            matrices = model.dynamics(0.0), model.INPUT
+            self.gain = continuous_gain(
+                *(with_integral(*matrices) if self._integrates else matrices), weights
+            )
         else:
             phi, gamma = self._discretise(model, 0.0)
             self.gain = stationary_gain(phi, gamma, weights)
@@ -145,20 +140,8 @@ class LinearQuadraticRegulator(Controller):
                 self.gains = finite_gains(phi, gamma, weights, terminal, steps)
 
     def _discretise(self, model: RelativeModel, time: float) -> tuple[Matrix, Matrix]:
-        phi, gamma = model.discretise(time, self.tick)
-        return self._augmented(phi, gamma, np.eye(3), self.tick)
-
-    def _augmented(
-        self, dynamics: Matrix, inputs: Matrix, kept: Matrix | float = 0.0, rate: float = 1.0
-    ) -> tuple[Matrix, Matrix]:
-        """Append the integral of position when there is one."""
-        if not self._integrates:
-            return dynamics, inputs
-        joint = np.zeros((9, 9))
-        joint[:6, :6] = dynamics
-        joint[6:, 6:] = kept
-        joint[6:, :3] = rate * np.eye(3)
-        return joint, np.vstack([inputs, np.zeros((3, 3))])
+        matrices = model.discretise(time, self.tick)
+        return with_integral(*matrices, np.eye(3), self.tick) if self._integrates else matrices
 
     def gain_at(self, time: int) -> Matrix:
         """Gain K (3, n) in force at a time of the run (ns): acceleration per m, m/s and m s of error."""
@@ -203,19 +186,5 @@ class LinearQuadraticRegulator(Controller):
             for row, given in zip(self.gain_at(estimate.time).tolist(), wanted.tolist(), strict=True)
         ]
         if self._integrates:
-            # Anti-wind-up: what an axis at its limit cannot give, more integral would not get.
-            self._integral = [
-                total + off * self.tick if abs(value) < limit else total
-                for total, off, value, limit in zip(
-                    self._integral, error[:3], force, self._limit, strict=True
-                )
-            ]
+            self._integral = integrated(self._integral, error[:3], force, self._limit, self.tick)
         return Command(np.array(force), fallback=reason)
-
-
-def _with_integral(parameters: LqrParameters) -> Matrix:
-    """Q (6, 6), or (9, 9) with the integral of position."""
-    q = parameters.state_matrix()
-    if not parameters.integral_error > 0.0:
-        return q
-    return np.asarray(block_diag(q, np.eye(3) / parameters.integral_error**2))

@@ -4,15 +4,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
 from formation_gnc.control.feed_forward import FeedForward
 from formation_gnc.control.finite_horizon import PLAN_MODELS
+from formation_gnc.control.integral import IntegralWeights, integrated, with_integral
 from formation_gnc.control.lqr import LinearQuadraticRegulator, LqrParameters
 from formation_gnc.control.riccati import Weights, stationary_gain
 from formation_gnc.control.steering import FACTORISATIONS, discretised, state_dependent
-from formation_gnc.control.weights import QuadraticWeights
 from formation_gnc.errors import ConfigurationError, DesignError
 from formation_gnc.interface import NANOSECONDS, Estimate, Matrix, Target, Vector
 from formation_gnc.mission import Mission
@@ -23,7 +22,7 @@ from formation_gnc.relative.model import INPUT
 
 
 @dataclass(frozen=True)
-class SdreParameters(QuadraticWeights):
+class SdreParameters(IntegralWeights):
     """Weights, equations of motion and their factorisation."""
 
     model: str = parameter(
@@ -44,13 +43,6 @@ class SdreParameters(QuadraticWeights):
         minimum=0.0,
         in_flight=True,
         doc="time for which one gain is flown; 0 solves at every tick",
-    )
-    integral_error: float = parameter(
-        0.0,
-        unit="m s",
-        minimum=0.0,
-        in_flight=True,
-        doc="integral of position error that weighs one; 0 for no integral",
     )
     feed_forward: str = parameter(
         "none",
@@ -83,18 +75,15 @@ class Sdre(Controller):
             DesignError: inadmissible weights.
         """
         self._parameters = parameters
-        self._tick, self._limit, self._mass = mission.tick, vehicle.thrust_limit, vehicle.mass
+        self._tick, self._limit, self._mass = mission.tick, vehicle.thrust_limit.tolist(), vehicle.mass
         self._chief = mission.chief
-        self._integrates = parameters.integral_error > 0.0
-        self._integral = np.zeros(3)
+        self._integrates = parameters.integrates
+        self._integral = [0.0, 0.0, 0.0] if self._integrates else []
         self._gain: Matrix | DesignError = DesignError("none yet")
         self._updated_at: int | None = None
         try:
-            q = parameters.state_matrix()
-            if self._integrates:
-                q = np.asarray(block_diag(q, np.eye(3) / parameters.integral_error**2))
             r = vehicle.mass**2 * parameters.thrust_matrix()
-            self._weights = Weights.scaled(q, r, mission.tick)
+            self._weights = Weights.scaled(parameters.joint_matrix(), r, mission.tick)
         except DesignError as error:
             raise DesignError(f"sdre: {error}") from error
         self.reserve = LinearQuadraticRegulator(LqrParameters(**parameters.weights()), mission, vehicle)
@@ -110,7 +99,7 @@ class Sdre(Controller):
     def take_over(self, handover: Handover) -> None:
         """Keep the integral of an SDRE that flew before."""
         if self._integrates and isinstance(handover.law, Sdre):
-            self._integral = handover.law._integral.copy()
+            self._integral = handover.law._integral or self._integral
 
     def gain(self, dynamics: Matrix) -> Matrix:
         """Gain K (3, n) of the discrete LQR for A(x) (6, 6) held, with the integral of position if any.
@@ -120,10 +109,7 @@ class Sdre(Controller):
         """
         inputs = INPUT
         if self._integrates:
-            joint = np.zeros((9, 9))
-            joint[:6, :6] = dynamics
-            joint[6:, :3] = np.eye(3)
-            dynamics, inputs = joint, np.vstack([INPUT, np.zeros((3, 3))])
+            dynamics, inputs = with_integral(dynamics, inputs)
         held = (3, *dynamics.shape)
         phi, gamma = discretised(
             np.broadcast_to(dynamics, held), np.broadcast_to(inputs, (3, *inputs.shape)), self._tick
@@ -156,9 +142,11 @@ class Sdre(Controller):
         except (ConfigurationError, ArithmeticError) as reason:
             reserve = self.reserve.command(estimate, target)
             return Command(reserve.force, fallback=f"no gain: {reason}; LQR flies")
-        acceleration: Vector = -gain[:, :6] @ error - gain[:, 6:] @ self._integral[: gain.shape[1] - 6]
+        acceleration: Vector = -gain[:, :6] @ error - gain[:, 6:] @ np.array(self._integral)
         wanted, reason_of_none = self._feed_forward(estimate, target)
         force = estimate.mass * (acceleration + ((there - here) @ goal)[3:] + wanted)
         if self._integrates:
-            self._integral += np.where(np.abs(force) < self._limit, error[:3], 0.0) * self._tick
+            self._integral = integrated(
+                self._integral, error[:3].tolist(), force.tolist(), self._limit, self._tick
+            )
         return Command(force, fallback=reason_of_none)

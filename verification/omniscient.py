@@ -1,0 +1,31 @@
+"""What flies on the truth in place of estimates."""
+
+import numpy as np
+
+from formation_gnc.interface import Estimate, EstimateStatus, Measurement
+from formation_gnc.plant.plant import Plant
+
+
+class Omniscient:
+    """Stands where the navigation does, and gives the truth as the estimate."""
+
+    def __init__(self, plant: Plant, name: str) -> None:
+        """For a deputy of this plant."""
+        self._plant, self._index = plant, plant.parameters.deputies.index(name)
+
+    def on_tick(self, measurement: Measurement) -> Estimate:
+        """The true state at the tick."""
+        deputy = self._plant.truth().deputies[self._index]
+        return Estimate(
+            time=measurement.time,
+            relative_state=deputy.relative_state,
+            covariance=np.zeros((6, 6)),
+            chief_state=measurement.chief_state,
+            mass=measurement.mass,
+            eclipse=measurement.eclipse,
+            sensor=[],
+            innovation=[],
+            innovation_sigma=[],
+            nis=0.0,
+            status=EstimateStatus.TRACKING,
+        )
