@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from formation_gnc.analysis.flown import Flown, Mark
-from formation_gnc.analysis.metrics import figures, trajectory
+from formation_gnc.analysis.metrics import deputies_of, figures, trajectory
 from formation_gnc.analysis.overview import draw_overview, draw_panels
-from formation_gnc.analysis.separation import nearest_approach
+from formation_gnc.analysis.separation import minimum_separation
 from formation_gnc.nodes.record_in_process import InProcessRecorder
 from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.writer import BagWriter
@@ -45,7 +45,9 @@ def test_a_short_run_is_all_there(bag: Bag, flown: Flown) -> None:
         assert {sensor: len(rows) for sensor, rows in deputy.readings.items()} == dict.fromkeys(
             deputy.readings, 25
         )
-    assert flown.nearest == nearest_approach(bag)
+    truth, names = bag.arrays("/truth"), deputies_of(bag)
+    places = [truth[f"deputies.{index}.relative_state"][:, :3] for index in range(len(names))]
+    assert flown.nearest == minimum_separation(truth["time"], np.array(places), names)
     assert len(flown.distances) == 6
     assert min(rows[:, 1].min() for rows in flown.distances.values()) == flown.nearest.distance
 

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation_gnc.analysis.compare import gnc_topics
+from formation_gnc.analysis.flown import Flown
 from formation_gnc.analysis.metrics import figures as figures_of
 from formation_gnc.analysis.metrics import trajectory
-from formation_gnc.analysis.separation import nearest_approach, predicted_approach
+from formation_gnc.analysis.separation import predicted_approach
 from formation_gnc.cli import main as command
 from formation_gnc.guidance.assignment import assign, assign_with_phase, transfer_costs
 from formation_gnc.guidance.registry import FORMATIONS
@@ -256,7 +257,7 @@ def of_fleet(graph: Bag, process: Bag) -> tuple[str, list[Figure]]:
         to_go, later = (float(np.interp(CHANGE + wait, path.time, off)) for wait in (1.0, orbit))
         lines.append(f"| {name} | {to_go:.0f} | {later:.1f} | {last:.2f} | {deputy.delta_v_m_s:.3f} |")
     lines += ["", "| nearest approach | m | who | when, s |", "|---|---|---|---|"]
-    nearest = nearest_approach(graph)
+    nearest = Flown(graph).nearest
     foreseen = {kind: predicted_approach(graph, kind) for kind in ("planned", "passive")}
     words = {
         "planned": "predicted, one on target and the others coasting",

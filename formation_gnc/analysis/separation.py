@@ -40,13 +40,6 @@ def minimum_separation(times: Vector, positions: Matrix, names: Sequence[str]) -
     return nearest
 
 
-def nearest_approach(bag: Bag) -> Separation | None:
-    """Nearest approach of any two deputies of a recorded run, tick by tick, by the truth."""
-    names, truth = deputies_of(bag), bag.arrays("/truth")
-    positions = [truth[f"deputies.{index}.relative_state"][:, :3] for index in range(len(names))]
-    return minimum_separation(truth["time"], np.array(positions), names)
-
-
 def predicted_approach(bag: Bag, kind: str) -> Separation | None:
     """Nearest approach that guidance foresaw in a recorded run; none when it looked for none.
 

@@ -80,6 +80,23 @@ class Desk:
         self.terminals.append(terminal)
         return terminal
 
+    def take_off(self) -> tuple[Terminal, dict[str, Terminal]]:
+        """A flight that is recorded to `bag` and goes on while nodes are killed: the plant and the parts."""
+        self.start("recorder", bag=self.directory / "bag")
+        plant = self.start(
+            "plant", duration=900.0, real_time_factor=100.0, deadline=0.5, wait_for_recorder=True
+        )
+        terminals = {kind: self.start(kind) for kind in PARTS}
+        wait_until(lambda: "acquired" in terminals["navigation"].text, "the first estimate")
+        return plant, terminals
+
+    def land(self) -> None:
+        """Ask everybody to stop, and wait until they have."""
+        for terminal in self.terminals:
+            if terminal.process.poll() is None:
+                terminal.signal(signal.SIGINT)
+        wait_until(lambda: all(each.process.poll() is not None for each in self.terminals), "the end")
+
     def clear(self) -> None:
         for terminal in self.terminals:
             if terminal.process.poll() is None:

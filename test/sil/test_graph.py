@@ -169,19 +169,13 @@ def test_a_node_killed_and_started_again_rejoins_and_the_log_shows_the_gap_and_r
     desk: Desk, capsys: pytest.CaptureFixture[str]
 ) -> None:
     bag = desk.directory / "bag"
-    desk.start("recorder", bag=bag)
-    plant = desk.start("plant", duration=900.0, real_time_factor=100.0, deadline=0.5, wait_for_recorder=True)
-    terminals = {kind: desk.start(kind) for kind in PARTS}
-    wait_until(lambda: "acquired" in terminals["navigation"].text, "the first estimate")
+    plant, terminals = desk.take_off()
     time.sleep(2.0)
     terminals["navigation"].signal(signal.SIGKILL)
     wait_until(lambda: "miss" in plant.text, "the plant to miss the navigation")
     desk.start("navigation")
     assert plant.wait() == 0
-    for terminal in desk.terminals:
-        if terminal.process.poll() is None:
-            terminal.signal(signal.SIGINT)
-    wait_until(lambda: all(terminal.process.poll() is not None for terminal in desk.terminals), "the end")
+    desk.land()
 
     misses = events(bag, "miss")
     assert misses

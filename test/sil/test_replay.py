@@ -43,10 +43,7 @@ def test_a_controller_and_a_guidance_started_again_in_flight_are_so_in_the_repla
     desk: Desk, capsys: pytest.CaptureFixture[str]
 ) -> None:
     bag = desk.directory / "bag"
-    desk.start("recorder", bag=bag)
-    plant = desk.start("plant", duration=900.0, real_time_factor=100.0, deadline=0.5, wait_for_recorder=True)
-    terminals = {kind: desk.start(kind) for kind in PARTS}
-    wait_until(lambda: "acquired" in terminals["navigation"].text, "the first estimate")
+    plant, terminals = desk.take_off()
     for kind in ("controller", "guidance"):
         time.sleep(2.0)
         before = plant.text.count("miss")
@@ -54,10 +51,7 @@ def test_a_controller_and_a_guidance_started_again_in_flight_are_so_in_the_repla
         wait_until(lambda before=before: plant.text.count("miss") > before, f"the plant to miss the {kind}")
         desk.start(kind)
     assert plant.wait() == 0
-    for terminal in desk.terminals:
-        if terminal.process.poll() is None:
-            terminal.signal(signal.SIGINT)
-    wait_until(lambda: all(terminal.process.poll() is not None for terminal in desk.terminals), "the end")
+    desk.land()
     recorded = Bag(bag)
     starts = recorded.restarts(["/deputy1/thrust", "/deputy1/target", "/deputy1/estimate"])
     assert {topic: len(stamps) for topic, stamps in starts.items()} == {

@@ -38,6 +38,8 @@ import matplotlib.pyplot as plt
 
 MISSION = Mission(Chief(SEMI_MAJOR_AXIS), tick=TICK)
 HILL = HillModel(math.sqrt(MU / SEMI_MAJOR_AXIS**3))
+GAIN = continuous_gain(HILL.dynamics(0.0), HILL.INPUT, Weights.scaled(np.eye(6), 1e9 * np.eye(3), TICK))
+"""Of his LQR, Q = I and R = 1e9 I."""
 UNLIMITED = Vehicle(1.0, np.full(3, np.inf))
 SETTLED = (10.0, 1.0)
 """Errors, m, within which a flight counts as settled."""
@@ -51,8 +53,6 @@ def target_rate(orbit: Orbit, time: float) -> Array:
 def lqr(directory: Path) -> tuple[str, list[Figure]]:
     """Table 4.3: 1 to 10 km by LQR on Hill's equations."""
     start, goal, final = Orbit(1.0, 45.0, 1.0), Orbit(10.0, 60.0, 1.5), 2000
-    weights = Weights.scaled(np.eye(6), 1e9 * np.eye(3), TICK)
-    gain = continuous_gain(HILL.dynamics(0.0), HILL.INPUT, weights)
 
     def errors(eccentricity: float, share: float) -> Array:
         plant = model(eccentricity)
@@ -60,7 +60,7 @@ def lqr(directory: Path) -> tuple[str, list[Figure]]:
         def thrust(time: float, state: Array) -> Array:
             aim = goal.state(time)
             known = target_rate(goal, time) - plant.derivative(time, aim)
-            return np.asarray(-gain @ (state - aim) + share * known[3:])
+            return np.asarray(-GAIN @ (state - aim) + share * known[3:])
 
         states, _ = fly(plant, start.state(0.0), thrust, final)
         return in_joshis_order(states[-1] - goal.state(final))
