@@ -1,9 +1,11 @@
 """A part of a satellite's software whose parameters change in flight, at a tick."""
 
+import math
+import re
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import yaml
@@ -20,8 +22,9 @@ class Schedulable(Mission):
 
     schedule: tuple[str, ...] = parameter(
         (),
+        in_flight=True,
         doc="changes in flight, each `{at: SECONDS, PARAMETER: VALUE, ...}`, taking effect at the first tick "
-        "from then on",
+        "from then on; a new schedule may keep entries that are over, and what it adds must be to come",
     )
 
 
@@ -32,6 +35,12 @@ class Configuration[P, D]:
     parameters: P
     design: D
     changes: Mapping[str, Any]
+    plan: "Plan[P, D]" = ()
+    """What its schedule brings, if that is one of the changes."""
+
+
+type Plan[P, D] = tuple[tuple[int, Configuration[P, D]], ...]
+"""Configurations and the times (ns) from which they are to hold, in order."""
 
 
 class Part[P: Schedulable, D](ABC):
@@ -57,11 +66,8 @@ class Part[P: Schedulable, D](ABC):
         parameters = change(self._given, self._changes)
         self._time = 0
         self.configuration: Configuration[P, D] = Configuration(parameters, self.design(parameters), {})
-        self._foreseen: list[tuple[int, Configuration[P, D]]] = []
-        latest = self.configuration
-        for at, changes in sorted(map(scheduled, parameters.schedule), key=lambda entry: entry[0]):
-            latest = self._design_from(latest.parameters, changes)
-            self._foreseen.append((at, latest))
+        self.foreseen: Plan[P, D] = self._plan(self.configuration, -math.inf)
+        """What is scheduled and still to come."""
         self.forget()
 
     def forget(self) -> None:  # noqa: B027 - optional
@@ -90,7 +96,30 @@ class Part[P: Schedulable, D](ABC):
 
     def _design_from(self, parameters: P, changes: Mapping[str, Any]) -> Configuration[P, D]:
         changed = change(parameters, changes)
-        return Configuration(changed, self.design(changed), dict(changes))
+        configuration = Configuration(changed, self.design(changed), dict(changes))
+        if "schedule" not in changes:
+            return configuration
+        return replace(configuration, plan=self._plan(configuration, self._time))
+
+    def _plan(self, start: Configuration[P, D], over: float) -> Plan[P, D]:
+        """What the schedule of `start` brings after a time (ns), designed in turn.
+
+        Raises:
+            ConfigurationError: what it brings is not allowed, or is to come before that time and does not
+                stand in the schedule in force.
+        """
+        plan, latest = [], start
+        for entry in sorted(start.parameters.schedule, key=lambda entry: scheduled(entry)[0]):
+            at, changes = scheduled(entry)
+            if at > over:
+                latest = self._design_from(latest.parameters, changes)
+                plan.append((at, latest))
+            elif entry not in self.parameters.schedule:
+                raise ConfigurationError(
+                    f"parameter schedule: {entry!r} is not allowed; its time must be above "
+                    f"{over / NANOSECONDS:g} s, which is now"
+                )
+        return tuple(plan)
 
     def adopt(self, prepared: Configuration[P, D]) -> None:
         """Let a prepared configuration take over when the next tick begins."""
@@ -105,8 +134,10 @@ class Part[P: Schedulable, D](ABC):
         if time < self._time:
             self._start()
         self._time = time
-        while self._foreseen and self._foreseen[0][0] <= time:
-            self._let_take_over(time, self._foreseen.pop(0)[1])
+        while self.foreseen and self.foreseen[0][0] <= time:
+            (_, due), *later = self.foreseen
+            self.foreseen = tuple(later)
+            self._let_take_over(time, due)
         while self._adopted:
             adopted = self._adopted.popleft()
             if self._let_take_over(time, adopted):
@@ -116,7 +147,8 @@ class Part[P: Schedulable, D](ABC):
         """Swap, if that is still allowed."""
         try:
             # What was designed beforehand holds only if nothing else has changed since.
-            if change(self.parameters, due.changes) != due.parameters:
+            changed = change(self.parameters, due.changes)
+            if changed != due.parameters or any(at <= time for at, _ in due.plan):
                 due = self._design_from(self.parameters, due.changes)
         except (
             ConfigurationError
@@ -128,6 +160,8 @@ class Part[P: Schedulable, D](ABC):
 
     def _swap(self, time: int, new: Configuration[P, D]) -> None:
         old, self.configuration = self.configuration, new
+        if "schedule" in new.changes:
+            self.foreseen = new.plan
         self.take_over(old, new)
         before = dump(old.parameters)
         detail = ", ".join(
@@ -150,14 +184,33 @@ def scheduled(entry: str) -> tuple[int, dict[str, Any]]:
     try:
         changes = read_yaml(entry)
         at = round(float(changes.pop("at")) * NANOSECONDS)
-        return at, {str(name): value for name, value in changes.items()}
     except (yaml.YAMLError, AttributeError, KeyError, TypeError, ValueError, OverflowError):
         raise ConfigurationError(
             f"parameter schedule: {entry!r} is not allowed; "
             "it must be like '{at: 3000.0, algorithm: coast}' with the time in seconds"
         ) from None
+    if "schedule" in changes:
+        raise ConfigurationError(f"parameter schedule: {entry!r} is not allowed; it must not change itself")
+    return at, {str(name): value for name, value in changes.items()}
 
 
 def text_of(value: Any) -> str:
     """A parameter's value as events tell it."""
     return str(list(value)) if isinstance(value, tuple) else str(value)
+
+
+_TEXT = r"""(?:'(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*"|[^'"])*?"""
+_CHANGE = re.compile(rf"([\w.]+): {_TEXT} -> ({_TEXT})(?:$|, (?=[\w.]+: {_TEXT} -> ))")
+
+
+def changes_told(detail: str) -> dict[str, str]:
+    """New values, as text, by name, of the detail of an event of kind `parameters`: the inverse of
+    `name: old -> new, name: old -> new`, where what is in quotes may look like that too.
+
+    Raises:
+        ConfigurationError: there are none.
+    """
+    changes: dict[str, str] = dict(_CHANGE.findall(detail))
+    if not changes:
+        raise ConfigurationError(f"event {detail!r}: names no parameter that could be changed again")
+    return changes

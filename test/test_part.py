@@ -9,7 +9,7 @@ from formation_gnc.errors import ConfigurationError, DesignError
 from formation_gnc.interface import NANOSECONDS
 from formation_gnc.mission import Orbit
 from formation_gnc.parameters import parameter
-from formation_gnc.part import Configuration, Part, Schedulable
+from formation_gnc.part import Configuration, Part, Schedulable, changes_told
 
 ORBIT = Orbit(7e6)
 
@@ -116,7 +116,11 @@ def test_two_changes_before_a_tick_both_hold() -> None:
         ({"gain": 11.0}, "gain 11 is too much at lag 1"),
         ({"gain": 2.0, "mass": 1.0}, "parameter mass: cannot change in flight; set it at the start"),
         ({"gain": 2.0, "gian": 2.0}, "parameter gian: unknown; did you mean gain?"),
-        ({"schedule": ["{at: 1, gain: 2}"]}, "parameter schedule: cannot change in flight"),
+        ({"schedule": ["{at: 5, gain: 11}"]}, "gain 11 is too much at lag 1"),
+        (
+            {"schedule": ["{at: 0, gain: 2}"]},
+            "parameter schedule: '{at: 0, gain: 2}' is not allowed; its time must be above 0 s, which is now",
+        ),
         ({"tick": 2.0}, "parameter tick: cannot change in flight"),
     ],
 )
@@ -159,6 +163,62 @@ def test_a_scheduled_change_that_no_longer_fits_is_refused_at_its_tick_and_the_f
         (2, "refused", "gain 6 is too much at lag 4"),
         (4, "parameters", "gain: 1.0 -> 2"),
     ]
+
+
+def test_a_schedule_set_in_flight_takes_the_place_of_what_was_to_come() -> None:
+    part = Amplifier(("{at: 2, gain: 2}", "{at: 4, gain: 4}"))
+    part.tick(3)
+    part.adopt(part.prepare({"schedule": ["{at: 6, gain: 3}", "{at: 5, lag: 2}"]}))
+    assert [part.tick(second) for second in range(4, 8)] == [4.0, 4.0, 3.0, 3.0]  # due in the tick it came
+    part.adopt(part.prepare({"schedule": []}))
+    assert part.tick(8) == 3.0
+    assert [detail for _, _, detail in part.told()][-2:] == [
+        "gain: 4.0 -> 3",
+        "schedule: ['{at: 6, gain: 3}', '{at: 5, lag: 2}'] -> []",
+    ]
+
+
+def test_a_schedule_set_in_flight_is_designed_once_and_flown_in_every_new_run() -> None:
+    part = Amplifier(("{at: 2, gain: 2}",))
+    part.tick(3)
+    # what is over may stay in it, for a new run; it is not flown again in this one
+    part.adopt(part.prepare({"gain": 1.5}))
+    part.tick(4)
+    part.adopt(part.prepare({"schedule": ["{at: 2, gain: 2}", "{at: 6, lag: 3}"]}))
+    designed = len(part.designed)
+    assert [part.tick(second) for second in (5, 6)] == [1.5, 1.5]
+    assert part.parameters.lag == 3.0
+    assert len(part.designed) == designed
+    assert [part.tick(second) for second in (0, 2, 6)] == [1.5, 2.0, 2.0]
+    assert part.parameters.lag == 3.0
+
+
+def test_a_schedule_that_comes_too_late_is_refused_at_its_tick_and_the_old_one_stays() -> None:
+    part = Amplifier(("{at: 9, gain: 9}",))
+    part.tick(3)
+    with pytest.raises(ConfigurationError, match="must be above 3 s, which is now"):
+        part.prepare({"schedule": ["{at: 3, gain: 2}"]})
+    slow = part.prepare({"schedule": ["{at: 5, gain: 2}"]})
+    part.tick(4)
+    part.adopt(slow)
+    assert [part.tick(second) for second in (5, 8, 9)] == [1.0, 1.0, 9.0]
+    assert [kind for _, kind, _ in part.told()] == ["refused", "parameters"]
+
+
+@pytest.mark.parametrize(
+    ("detail", "changes"),
+    [
+        ("gain: 1.0 -> 2, label: a -> b", {"gain": "2", "label": "b"}),
+        ("a.limit: [0.1, 0.2] -> [1.0], b: 1 -> 2", {"a.limit": "[1.0]", "b": "2"}),
+        (
+            "schedule: ['{at: 1, gain: 2}'] -> ['{at: 3, gain: 2, x: a -> b}', '{at: 4, b: 1}'], lag: 1 -> 2",
+            {"schedule": "['{at: 3, gain: 2, x: a -> b}', '{at: 4, b: 1}']", "lag": "2"},
+        ),
+        ("schedule: [] -> [\"{at: 1, label: 'b'}\"]", {"schedule": "[\"{at: 1, label: 'b'}\"]"}),
+    ],
+)
+def test_the_words_of_an_event_give_its_changes_back(detail: str, changes: dict[str, str]) -> None:
+    assert changes_told(detail) == changes
 
 
 def test_time_that_runs_backwards_is_a_new_run_from_the_same_start() -> None:
@@ -216,7 +276,7 @@ def test_an_entry_of_the_schedule_that_makes_no_sense_is_refused_with_an_example
         ("{at: 1, gain: 11}", "gain 11 is too much at lag 1"),
         ("{at: 1, mass: 5}", "parameter mass: cannot change in flight"),
         ("{at: 1, 5: 5}", "parameter 5: unknown"),
-        ("{at: 1, schedule: []}", "parameter schedule: cannot change in flight"),
+        ("{at: 1, schedule: []}", "parameter schedule: '{at: 1, schedule: []}' is not allowed"),
     ],
 )
 def test_a_scheduled_change_that_is_not_allowed_is_refused_before_the_flight(entry: str, words: str) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from formation_gnc.guidance.assignment import Assignment, assign_with_phase, fuel_weights, transfer_costs
 from formation_gnc.guidance.registry import FORMATIONS
-from formation_gnc.guidance.targets import TARGET_MODELS
+from formation_gnc.guidance.targets import TARGET_MODELS, TargetPath
 from formation_gnc.interface import Matrix, Vector
 
 LEAST_TANK = 1e-3
@@ -21,6 +21,12 @@ def places_for(parameters: Any) -> int:
     return len(parameters.fleet) if places is None else places
 
 
+def path_to(parameters: Any, slot: int, phase: float) -> TargetPath:
+    """The path of a place of the formation that a guidance has in its parameters, at a phase (rad)."""
+    kind, own = FORMATIONS[parameters.formation], getattr(parameters, parameters.formation)
+    return TARGET_MODELS[parameters.model](kind(own, parameters.mean_motion, slot), phase, parameters)
+
+
 def share_out(parameters: Any, time: float, states: Matrix, masses: Vector) -> Assignment:
     """Places of a fleet in its formation, and the formation's phase, for the least total delta-v from now.
 
@@ -30,12 +36,10 @@ def share_out(parameters: Any, time: float, states: Matrix, masses: Vector) -> A
         states: (N, 6) relative states of the fleet, in its order, Hill frame, m and m/s.
         masses: (N,) kg.
     """
-    kind, own = FORMATIONS[parameters.formation], getattr(parameters, parameters.formation)
-    places = [kind(own, parameters.mean_motion, slot) for slot in range(places_for(parameters))]
-    now, model = np.array([time]), TARGET_MODELS[parameters.model]
+    now, places = np.array([time]), range(places_for(parameters))
 
     def targets(phase: float) -> Matrix:
-        return np.array([model(place, phase, parameters).states(now)[0] for place in places])
+        return np.array([path_to(parameters, slot, phase).states(now)[0] for slot in places])
 
     duration = parameters.reconfiguration_time or math.tau / parameters.mean_motion
     weights = None

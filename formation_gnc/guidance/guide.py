@@ -4,13 +4,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, make_dataclass, replace
 from functools import lru_cache
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
 
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.guidance.fleet import places_for, share_out
+from formation_gnc.guidance.fleet import path_to, places_for, share_out
 from formation_gnc.guidance.prediction import in_words, predict
 from formation_gnc.guidance.registry import FORMATIONS
 from formation_gnc.guidance.targets import TARGET_MODELS, TargetPath
@@ -30,7 +30,7 @@ from formation_gnc.mission import LAST_SECOND
 from formation_gnc.orbit.eclipse import eclipses
 from formation_gnc.orbit.propagation import ImpactError
 from formation_gnc.parameters import parameter
-from formation_gnc.part import Configuration, Part, Schedulable
+from formation_gnc.part import Configuration, Part, Plan, Schedulable
 
 LARGEST_ERROR = 0.05
 """Error of the target's model in a revolution, as a share of the formation's size, above which it is told."""
@@ -157,11 +157,11 @@ class Guide(Part[Any, TargetPath]):
         super().__init__(name, parameters)
 
     def _start(self) -> None:
+        self._until = 0
         super()._start()
         self._unassigned = self.parameters.assignment != "fixed"
         self._untold = True
         self._left: str | None = None
-        self._until = 0
 
     def forget(self) -> None:
         """Nothing has been looked for yet, eclipses or others that come near."""
@@ -169,6 +169,7 @@ class Guide(Part[Any, TargetPath]):
         self._predicted, self._warned = NEVER, False
         self._waits_for = ""
         self._known: Mapping[str, Estimate | Neighbour] = {}
+        self._mates: Mapping[str, TargetPath] = {}
 
     def design(self, parameters: Any) -> TargetPath:
         """The path of the named formation's place, with its own parameters, in the named model."""
@@ -183,8 +184,7 @@ class Guide(Part[Any, TargetPath]):
             _check_assignment(parameters)
         orbit = np.linspace(0.0, math.tau / parameters.mean_motion, 8)
         with np.errstate(all="ignore"):
-            formation = kind(own, parameters.mean_motion, parameters.slot)
-            path = TARGET_MODELS[parameters.model](formation, parameters.phase, parameters)
+            path = path_to(parameters, parameters.slot, parameters.phase)
             furthest = np.abs(path.states(orbit)[:, :3]).max()
         if not furthest < OUT_OF_REACH:  # and so no target overflows, ever
             raise ConfigurationError(
@@ -198,12 +198,11 @@ class Guide(Part[Any, TargetPath]):
         return path
 
     def prepare(self, changes: Mapping[str, Any]) -> Configuration[Any, TargetPath]:
-        """As :meth:`Part.prepare`; refuses while a change that was given a time is under way."""
-        if self._time < self._until:
-            raise ConfigurationError(self._under_way())
-        if self.parameters.assignment != "fixed" and not all(
-            name.startswith("separation_") for name in changes
-        ):
+        """As :meth:`Part.prepare`; refuses another target while a change that was given a time is under way,
+        and where it would be another for one of the fleet alone."""
+        if self._time < self._until and not _are_aside(changes):
+            raise ConfigurationError(self._under_way(self._until))
+        if self.parameters.assignment != "fixed" and not _are_aside(changes):
             raise ConfigurationError(
                 f"assignment is {self.parameters.assignment}: the whole fleet changes at one tick, and so by "
                 "schedule only; the target stays"
@@ -214,11 +213,10 @@ class Guide(Part[Any, TargetPath]):
 
     def _check_that_nobody_is_there(self, prepared: Configuration[Any, TargetPath]) -> None:
         """Refuse a target that another of the fleet holds."""
-        now = np.array([self._time / NANOSECONDS])
-        target, (_, size) = prepared.design.states(now)[0], prepared.design.error()
-        room = max(TAKEN * size, prepared.parameters.separation_warning)
-        if np.array_equal(target, self.configuration.design.states(now)[0]):
+        if _is_same(self.configuration, prepared, self._time):
             return
+        target = prepared.design.states(np.array([self._time / NANOSECONDS]))[0]
+        room = max(TAKEN * prepared.design.error()[1], prepared.parameters.separation_warning)
         reach = room * np.repeat([1.0, prepared.parameters.mean_motion], 3)
         for name, each in self._known.items():
             if (np.abs(each.relative_state - target) < reach).all():
@@ -227,21 +225,34 @@ class Guide(Part[Any, TargetPath]):
                     f"within {room:g} m; each must have its own, and the target stays"
                 )
 
+    def _plan(self, start: Configuration[Any, TargetPath], over: float) -> Plan[Any, TargetPath]:
+        """As :meth:`Part._plan`; refuses two changes of target of which the second comes too soon."""
+        plan, until = super()._plan(start, over), self._until
+        for (_, old), (at, new) in pairwise([(0, start), *plan]):
+            if not _is_same(old, new, at):
+                if at < until:
+                    raise ConfigurationError(
+                        f"parameter schedule: a change at {at / NANOSECONDS:g} s is not allowed; "
+                        + self._under_way(until)
+                    )
+                until = at + round(new.parameters.reconfiguration_time * NANOSECONDS)
+        return plan
+
     def _let_take_over(self, time: int, due: Configuration[Any, TargetPath]) -> bool:
-        if time < self._until:
-            self.record(time, "refused", self._under_way())
+        if time < self._until and not _are_aside(due.changes):
+            self.record(time, "refused", self._under_way(self._until))
             return False
         return super()._let_take_over(time, due)
 
-    def _under_way(self) -> str:
-        return f"a reconfiguration is under way until {self._until / NANOSECONDS:g} s; the target stays"
+    @staticmethod
+    def _under_way(until: int) -> str:
+        return f"a reconfiguration is under way until {until / NANOSECONDS:g} s; the target stays"
 
     def take_over(self, old: Configuration[Any, TargetPath], new: Configuration[Any, TargetPath]) -> None:
         """Remember what is left, if the target changes at all."""
-        now = np.array([self._time / NANOSECONDS])
-        if np.array_equal(old.design.states(now), new.design.states(now)):
+        if _is_same(old, new, self._time):
             return
-        self._unassigned = new.parameters.assignment != "fixed"
+        self._unassigned, self._mates = new.parameters.assignment != "fixed", {}
         self._untold, self._left = True, old.parameters.formation
         self._until = self._time + round(new.parameters.reconfiguration_time * NANOSECONDS)
 
@@ -300,6 +311,10 @@ class Guide(Part[Any, TargetPath]):
         index = parameters.fleet.index(self._deputy)
         place = {"slot": shared.slots[index], "phase": shared.phase}
         self.configuration = self._design_from(parameters, place)
+        self._mates = {
+            name: path_to(parameters, slot, shared.phase)
+            for name, slot in zip(parameters.fleet, shared.slots, strict=True)
+        }
         self.record(
             estimate.time,
             "assignment",
@@ -319,6 +334,7 @@ class Guide(Part[Any, TargetPath]):
             target,
             estimate.relative_state,
             names,
+            self._mates,
             parameters.separation_horizon,
             parameters.mean_motion,
         )
@@ -376,17 +392,26 @@ class Guide(Part[Any, TargetPath]):
         else:
             self.record(estimate.time, "reconfiguration", detail)
 
-    @property
-    def foreseen(self) -> list[int]:
-        """Times (ns) of the changes that are scheduled and still to come."""
-        return [at for at, _ in self._foreseen]
-
 
 @lru_cache(maxsize=16)
 def _ahead(step: float, steps: int) -> Vector:
     """(1 + steps,) times (s) of a target and its preview from the tick on."""
     ahead: Vector = step * np.arange(steps + 1.0)
     return ahead
+
+
+def _are_aside(changes: Mapping[str, Any]) -> bool:
+    """Whether changes leave the target alone for now, whatever their values."""
+    return all(name == "schedule" or name.startswith("separation_") for name in changes)
+
+
+def _is_same(old: Configuration[Any, TargetPath], new: Configuration[Any, TargetPath], time: int) -> bool:
+    """Whether a change at a time (ns) leaves the target as it is; for a fleet that shares places out, whether
+    it does for whoever is in it."""
+    if new.parameters.assignment != "fixed":
+        return _are_aside(new.changes)
+    now = np.array([time / NANOSECONDS])
+    return np.array_equal(old.design.states(now), new.design.states(now))
 
 
 def _is_near(estimate: Estimate | Neighbour) -> bool:
@@ -436,7 +461,7 @@ def check_places(deputies: Mapping[str, Any]) -> None:
                 )
     deputies = {name: each for name, each in deputies.items() if each.assignment == "fixed"}
     guides = {name: Guide(f"/{name}/guidance", parameters) for name, parameters in deputies.items()}
-    for time in sorted({0, *(at for guide in guides.values() for at in guide.foreseen)}):
+    for time in sorted({0, *(at for guide in guides.values() for at, _ in guide.foreseen)}):
         states = {}
         for name, guide in guides.items():
             guide.begin_tick(time)

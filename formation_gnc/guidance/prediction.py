@@ -1,6 +1,7 @@
 """How near satellites will come to one another."""
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -13,23 +14,35 @@ leaves out a thousandth of the distance."""
 
 
 def predict(
-    path: TargetPath, target: Target, state: Vector, names: list[str], horizon: float, mean_motion: float
+    path: TargetPath,
+    target: Target,
+    state: Vector,
+    names: list[str],
+    mates: Mapping[str, TargetPath],
+    horizon: float,
+    mean_motion: float,
 ) -> Separation:
     """Least distance of a satellite to the others: along its preview, and if nobody's thrusters fire.
 
+    Along the preview the satellite is on its target; of the others, who has a known path is on it, and the
+    rest coast.
+
     Args:
         path: gives the model in which satellites coast.
-        target: where the satellite is to be, with the preview, and where the others are, who coast.
+        target: where the satellite is to be, with the preview, and where the others are.
         state: (6,) where it is, Hill frame, m and m/s.
         names: of the others, one or more.
+        mates: paths of others, by name, as far as they are known.
         horizon: revolutions for which all coast.
         mean_motion: rate of the chief, rad/s.
     """
     time = target.time / NANOSECONDS
     ahead = target.preview_step * np.arange(len(target.preview) + 1.0)
-    planned = np.vstack([target.relative_state, target.preview])[:, None] - path.coast(
-        target.others, time, ahead
-    )
+    others = path.coast(target.others, time, ahead)
+    for index, name in enumerate(names):
+        if name in mates:
+            others[:, index] = mates[name].states(time + ahead)
+    planned = np.vstack([target.relative_state, target.preview])[:, None] - others
     later: Vector = np.linspace(0.0, horizon * math.tau / mean_motion, math.ceil(horizon * POINTS) + 1)
     passive = path.coast(state - target.others, time, later)
     near, far = _nearest(planned, ahead), _nearest(passive, later)

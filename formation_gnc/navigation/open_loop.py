@@ -1,7 +1,6 @@
 """A recorded run's measurements through a filter, without the graph: the same again, or a changed one
 beside it."""
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from json import loads
@@ -14,10 +13,8 @@ from formation_gnc.errors import ConfigurationError
 from formation_gnc.interface import NANOSECONDS, Estimate, Matrix, Measurement, Refusal, Vector
 from formation_gnc.navigation.navigator import NavigationParameters, Navigator
 from formation_gnc.parameters import leaves, load, read_yaml
+from formation_gnc.part import changes_told
 from formation_gnc.recording.reader import Bag
-
-_CHANGE = re.compile(r"([\w.]+): (.*?) -> (.*?)(?=, [\w.]+: |$)")
-"""One parameter in the detail of a `parameters` event: name, old and new value."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +130,9 @@ def _changes_in_flight(bag: Bag, node: str, fixed: frozenset[str]) -> dict[int, 
     for _, event, _ in bag.decoded(["/events"]):
         if event.node == node and event.kind == "parameters":
             found = {
-                name: read_yaml(new) for name, _, new in _CHANGE.findall(event.detail) if name not in fixed
+                name: read_yaml(text)
+                for name, text in changes_told(event.detail).items()
+                if name not in fixed
             }
             if found:
                 changes.setdefault(_stamp(event), []).append(found)

@@ -22,7 +22,7 @@ from formation_gnc.interface import EstimateStatus, Event, Timing
 from formation_gnc.meeting import Meeting
 from formation_gnc.navigation.navigator import NavigationParameters, Navigator
 from formation_gnc.parameters import OWN_OF_ROS, dump, leaves, load, read_yaml
-from formation_gnc.part import Part, scheduled, text_of
+from formation_gnc.part import Part, changes_told, text_of
 from formation_gnc.recording.reader import Bag
 from formation_gnc.sil.runner import Sink
 
@@ -73,7 +73,6 @@ class ReplayedPart:
     def start(self) -> None:
         """Begin anew, as a process that was just started."""
         self._part: Part[Any, Any] = self.kind.build(self.node, self.parameters)
-        self._foreseen = sorted(map(scheduled, self.parameters.schedule), key=lambda entry: entry[0])
         self._meeting = Meeting((*self.inputs, *self.others), len(self.inputs))
 
     def meet(self, records: Mapping[str, Any]) -> list[Any] | None:
@@ -86,11 +85,10 @@ class ReplayedPart:
 
     def tick(self, time: int, inputs: list[Any], swaps: list[Event]) -> tuple[tuple[Any, ...], list[Event]]:
         """Outputs, none while there is no state, and events of a tick on which `swaps` were recorded."""
-        due = [changes for at, changes in self._foreseen if at <= time]
-        del self._foreseen[: len(due)]
+        due = [foreseen.changes for at, foreseen in self._part.foreseen if at <= time]
         ours = [{name: text_of(value) for name, value in changes.items()} for changes in due]
         for swap in swaps:
-            changes = _changes(swap.detail, dump(self._part.parameters))
+            changes = changes_told(swap.detail)
             if changes in ours:
                 ours.remove(changes)  # the schedule brings it about by itself
             else:
@@ -113,16 +111,6 @@ class ReplayedPart:
     def _typed(self, texts: Mapping[str, str]) -> dict[str, Any]:
         kinds = {leaf.name: leaf.type for leaf in leaves(self.kind.schema, dump(self.parameters))}
         return {name: text if kinds[name] is str else read_yaml(text) for name, text in texts.items()}
-
-
-def _changes(detail: str, known: Collection[str]) -> dict[str, str]:
-    """New values, as text, of an event `name: old -> new, name: old -> new`."""
-    names = "|".join(re.escape(name) for name in sorted(known, key=len, reverse=True))
-    pieces = re.split(rf"(?:^|, )({names}): ", detail)[1:]
-    changes = {name: text.rpartition(" -> ")[2] for name, text in zip(pieces[::2], pieces[1::2], strict=True)}
-    if not changes:
-        raise ConfigurationError(f"event {detail!r}: names no parameter that could be changed again")
-    return changes
 
 
 def parameters_of(bag: Bag, node: str) -> dict[str, Any]:

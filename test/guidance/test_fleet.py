@@ -12,6 +12,7 @@ from formation_gnc.errors import ConfigurationError
 from formation_gnc.guidance.guide import GuidanceParameters, Guide, check_places
 from formation_gnc.interface import NANOSECONDS, Estimate, Target
 from formation_gnc.parameters import load
+from formation_gnc.relative.hill import HillModel
 
 Array = NDArray[np.float64]
 
@@ -56,6 +57,12 @@ def on_the_ring(phase: float) -> Array:
         for slot in range(4)
     ]
     return np.array(found)
+
+
+def propagated(states: Array, seconds: float) -> Array:
+    """Free motion under Hill's equations."""
+    moved: Array = states @ HillModel(parameters().mean_motion).transition(0.0, seconds).T
+    return moved
 
 
 def test_the_others_come_with_the_target_in_the_order_of_the_fleet() -> None:
@@ -227,6 +234,60 @@ def test_one_alone_may_not_change_what_is_shared_out() -> None:
     with pytest.raises(ConfigurationError, match="by schedule only"):
         guide.prepare({"formation": "tetrahedral"})
     guide.prepare({"separation_warning": 5.0})
+
+
+def test_a_fleet_that_is_told_one_after_the_other_changes_at_one_tick_to_places_of_one_mind() -> None:
+    fleet = guides(assignment="delta_v", reconfiguration_time=500.0)
+    states = on_the_ring(0.0)
+    order = {"schedule": ["{at: 40.0, formation: tetrahedral}"]}
+    for second in range(45):
+        if second in (10, 20, 30, 39):
+            guide = fleet[FLEET[second // 10 - (second < 39)]]
+            guide.adopt(guide.prepare(order))
+        targets = fly(fleet, states, float(second))
+        formation = RING["formation"] if second < 40 else "tetrahedral"
+        assert {target.formation for target in targets} == {formation}
+        states = np.array([target.relative_state for target in targets])
+    assert sorted(guide.parameters.slot for guide in fleet.values()) == [0, 1, 2, 3]
+    assert len({guide.parameters.phase for guide in fleet.values()}) == 1
+    # while that is under way, nothing else is; what comes after it may be foreseen
+    guide = fleet["deputy1"]
+    for entry in ("{at: 539.0, formation: helix}", "{at: 539.0, phase: 1.0}"):
+        with pytest.raises(ConfigurationError, match=r"at 539 s is not allowed; .* under way until 540 s"):
+            guide.prepare({"schedule": [*order["schedule"], entry]})
+    guide.prepare({"schedule": ["{at: 540.0, formation: helix}", "{at: 100.0, separation_warning: 9.0}"]})
+    assert [foreseen for foreseen, _ in guide.foreseen] == []
+    assert guide.parameters.formation == "tetrahedral"
+
+
+def test_two_scheduled_changes_of_which_the_second_comes_too_soon_are_refused_before_the_flight() -> None:
+    entries = "{at: 100.0, phase: 1.0}", "{at: 599.0, phase: 2.0}"
+    with pytest.raises(ConfigurationError, match=r"at 599 s is not allowed; .* under way until 600 s"):
+        Guide("/deputy1/guidance", parameters(reconfiguration_time=500.0, schedule=entries))
+    Guide("/deputy1/guidance", parameters(reconfiguration_time=499.0, schedule=entries))
+
+
+def test_where_places_are_shared_out_the_others_are_predicted_on_their_targets_and_else_to_coast() -> None:
+    off = np.zeros((4, 6))
+    off[1:, 1] = 500.0  # along the track, where it is free motion too
+    values = {"preview_steps": 50, "preview_step": 60.0}
+    found = {}
+    for assignment in ("delta_v", "fixed"):
+        fleet = guides(assignment=assignment, **values)
+        states = on_the_ring(0.3)
+        if assignment == "fixed":
+            fleet["deputy1"] = Guide("/deputy1/guidance", parameters(phase=0.3, **values))
+        else:
+            fly(fleet, states)
+        seen = [estimate(state, 60.0) for state in propagated(states, 60.0) + off]
+        _, separation = fleet["deputy1"].on_tick(*seen)
+        assert separation is not None
+        found[assignment] = separation
+    # the side of the ring's square, sqrt(2) km, or what is left of it for who is 500 m off
+    assert found["delta_v"].planned == pytest.approx(1000.0 * math.sqrt(2.0), rel=2e-3)
+    assert found["fixed"].planned == pytest.approx(found["fixed"].passive, rel=1e-3)
+    assert found["fixed"].planned < 1100.0
+    assert found["delta_v"].passive == pytest.approx(found["fixed"].passive)
 
 
 def test_a_fleet_at_odds_is_refused_at_the_start() -> None:

@@ -186,10 +186,8 @@ def test_a_target_out_of_reach_in_the_time_given_is_reported_and_flown_to(
 
 
 def test_no_change_is_taken_while_another_is_under_way(at: Callable[..., Estimate]) -> None:
-    guided = guide(
-        reconfiguration_time=100.0,
-        schedule=["{at: 10, leader_follower.separation: 120}", "{at: 50, leader_follower.separation: 150}"],
-    )
+    guided = guide(reconfiguration_time=100.0, schedule=["{at: 50, leader_follower.separation: 150}"])
+    guided.adopt(guided.prepare({"leader_follower.separation": 120.0}))
     guided.on_tick(at(10.0))
     told(guided)
     with pytest.raises(ConfigurationError, match="under way until 110 s; the target stays"):

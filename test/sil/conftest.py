@@ -8,9 +8,15 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import domain_coordinator
 import pytest
+import rclpy
+from rcl_interfaces.srv import SetParameters
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.nodes.launcher import executable
@@ -32,6 +38,26 @@ def wait_until(condition: Callable[[], bool], what: str, patience: float = PATIE
     while not condition():
         assert time.monotonic() < end, f"not within {patience:g} s: {what}"
         time.sleep(0.05)
+
+
+def set_parameter(domain: int, node: str, name: str, value: Any) -> tuple[bool, str]:
+    """Set a parameter through the standard service, as `ros2 param set` does."""
+    context = Context()
+    rclpy.init(context=context, domain_id=domain)
+    user = rclpy.create_node("user", context=context)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(user)
+    try:
+        client = user.create_client(SetParameters, f"{node}/set_parameters")
+        assert client.wait_for_service(timeout_sec=PATIENCE)
+        request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
+        answer = client.call_async(request)
+        executor.spin_until_future_complete(answer, timeout_sec=PATIENCE)
+        result = answer.result().results[0]
+        return bool(result.successful), str(result.reason)
+    finally:
+        user.destroy_node()
+        rclpy.shutdown(context=context)
 
 
 class Terminal:

@@ -13,49 +13,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import rclpy
 import yaml
-from rcl_interfaces.msg import Parameter as ParameterMessage
-from rcl_interfaces.msg import ParameterType, ParameterValue
-from rcl_interfaces.srv import SetParameters
-from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
 
 from formation_gnc.cli import main
 from formation_gnc.control.registry import ALGORITHMS
 from formation_gnc.recording.reader import Bag, identical
 
-from .conftest import GNC_TOPICS, PARTS, PATIENCE, Desk, Sil, wait_until
+from .conftest import GNC_TOPICS, PARTS, PATIENCE, Desk, Sil, set_parameter, wait_until
 
 pytestmark = pytest.mark.sil
 
 StartSil = Callable[..., Sil]
-
-
-def set_parameter(desk: Desk, node: str, name: str, value: str) -> tuple[bool, str]:
-    """Set a string parameter through the standard service, as `ros2 param set` does."""
-    context = Context()
-    rclpy.init(context=context, domain_id=desk.domain)
-    user = rclpy.create_node("user", context=context)
-    executor = SingleThreadedExecutor(context=context)
-    executor.add_node(user)
-    try:
-        client = user.create_client(SetParameters, f"{node}/set_parameters")
-        assert client.wait_for_service(timeout_sec=PATIENCE)
-        request = SetParameters.Request(
-            parameters=[
-                ParameterMessage(
-                    name=name, value=ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=value)
-                )
-            ]
-        )
-        answer = client.call_async(request)
-        executor.spin_until_future_complete(answer, timeout_sec=PATIENCE)
-        result = answer.result().results[0]
-        return bool(result.successful), str(result.reason)
-    finally:
-        user.destroy_node()
-        rclpy.shutdown(context=context)
 
 
 def events(bag: Path, kind: str) -> list[tuple[int, str]]:
@@ -80,9 +48,9 @@ def test_nodes_started_by_hand_in_any_order_fly_and_swap_the_law_in_flight(desk:
     terminals = {kind: desk.start(kind, **options.get(kind, {})) for kind in kinds}
     wait_until(lambda: "acquired" in terminals["navigation"].text, f"the first estimate of {kinds}")
     time.sleep(1.0)
-    accepted, reason = set_parameter(desk, "/deputy1/controller", "algorithm", "coast")
+    accepted, reason = set_parameter(desk.domain, "/deputy1/controller", "algorithm", "coast")
     assert accepted, reason
-    refused, reason = set_parameter(desk, "/deputy1/controller", "algorithm", "magic")
+    refused, reason = set_parameter(desk.domain, "/deputy1/controller", "algorithm", "magic")
     assert not refused
     assert "magic" in reason
     assert "coast, " in reason, "the reason says what is allowed"
@@ -128,7 +96,7 @@ def test_two_rounds_of_laws_under_load_miss_no_tick_and_step_no_further_than_the
     wait_until(lambda: "acquired" in terminals["navigation"].text, "the first estimate")
     laws = ["lqr", *("hinf", "mpc", "hinf", "lqr") * 2]
     for law in laws[1:]:
-        accepted, reason = set_parameter(desk, "/deputy1/controller", "algorithm", law)
+        accepted, reason = set_parameter(desk.domain, "/deputy1/controller", "algorithm", law)
         assert accepted, reason
     wait_until(lambda: terminals["controller"].text.count(" handover: ") == 8, "the last hand-over")
     assert plant.process.poll() is None, "the flight was too short for all swaps"

@@ -9,12 +9,14 @@ import yaml
 
 from formation_gnc.analysis.compare import gnc_topics
 from formation_gnc.analysis.separation import minimum_separation
+from formation_gnc.cli import main
 from formation_gnc.interface import Event, Truth
+from formation_gnc.nodes.launcher import Report, fly_graph
 from formation_gnc.recording.reader import Bag, identical
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import find_scenario, load_scenario
 
-from .conftest import Sil
+from .conftest import Sil, set_parameter
 
 CHANGE = 8890
 
@@ -93,6 +95,45 @@ def test_a_fleet_flies_the_same_bits_on_the_graph_composed_in_process_and_again(
     ]
     assert sorted(places) == ["0", "1", "2", "3"]
     assert graph.arrays("/deputy1/target")["others"].shape == (120, 18)
+
+
+@pytest.mark.sil
+def test_a_fleet_in_flight_is_told_of_another_formation_and_changes_at_one_tick(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    guidance = {"assignment": "delta_v", "schedule": [], "reconfiguration_time": 3000.0}
+    paced = {"duration": 600.0, "real_time_factor": 20.0}  # half a minute, for all to be told in
+    scenario = load_scenario("tetrahedral", {"/plant": paced, "/**/guidance": guidance})
+    at = 500
+    order = [f"{{at: {at}.0, formation: three_in_plane_one_out}}"]
+    domain, answers = 0, []
+
+    def hear(line: str) -> None:
+        nonlocal domain
+        domain = int(line.partition("=")[2])
+
+    def tell(report: Report) -> None:
+        if report.message == "flying" and not answers:
+            nodes = [f"/{name}/guidance" for name in scenario.deputies]
+            answers.extend(set_parameter(domain, node, "schedule", order) for node in nodes)
+            answers.append(set_parameter(domain, nodes[0], "schedule", ["{at: 0.0, formation: helix}"]))
+            answers.append(set_parameter(domain, nodes[0], "formation", "helix"))
+
+    report = fly_graph(scenario, tmp_path / "bag", tell, hear, composed=True)
+    assert [accepted for accepted, _ in answers] == [True] * 4 + [False] * 2
+    assert "its time must be above" in answers[4][1]
+    assert "by schedule only" in answers[5][1]
+    assert report.figures["misses"] == 0
+    bag = Bag(tmp_path / "bag")
+    for name in scenario.deputies:
+        formations = bag.arrays(f"/{name}/target")["formation"].tolist()
+        assert formations == ["tetrahedral"] * at + ["three_in_plane_one_out"] * (600 - at)
+    events = bag.arrays("/events")
+    kinds = list(zip(events["kind"].tolist(), events["tick"].tolist(), strict=True))
+    assert kinds.count(("assignment", at)) == 4
+    # what was told in flight is flown again at its tick
+    assert main(["replay", str(bag.path), "--bag", str(tmp_path / "again")]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "identical on every GNC topic"
 
 
 @pytest.mark.sil
