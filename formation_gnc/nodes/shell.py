@@ -21,6 +21,7 @@ from rclpy.parameter import Parameter
 from rclpy.service import Service
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
+from rclpy.timer import Timer
 
 try:
     from rclpy.experimental import EventsExecutor
@@ -47,6 +48,9 @@ CHECK_PERIOD = 0.1
 
 FAREWELL = 0.5
 """Wall time (s) that a node waits at its end for its last messages to arrive."""
+
+SETTLING = 0.1
+"""Wall time (s) that a node which has just started listens, from the first message on, before it answers."""
 
 _stop_signals: list[int] = []
 """Signals that have asked the process to stop. A bare list, since a handler that takes a lock, such as a
@@ -198,8 +202,13 @@ class PartNode[P: Part[Any, Any]](ConfiguredNode):
 
         `others` are topics of estimates of which a :class:`Neighbour` each comes after the inputs. They are
         not indispensable, and None when they are lost, as :class:`Meeting` says.
+
+        A node that comes late is told much of what was said before it came, and goes by the last of it: an
+        answer to more would look like a new run to those who have gone on.
         """
         meeting = Meeting((*inputs, *others), len(inputs))
+        settled = next(iter(inputs)) in self._wires
+        latest: dict[str, Callable[[], None]] = {}
 
         def take(topic: str, read: Callable[[Any], Any], given: Any) -> None:
             started = perf_counter()
@@ -211,8 +220,23 @@ class PartNode[P: Part[Any, Any]](ConfiguredNode):
             self._wires.deliver()
             self._finish_tick(records[0].time, spent)
 
+        def arrive(topic: str, read: Callable[[Any], Any], given: Any) -> None:
+            if settled:
+                take(topic, read, given)
+                return
+            if not latest:
+                timer: Timer = self.create_timer(SETTLING, lambda: settle(timer))
+            latest[topic] = partial(take, topic, read, given)
+
+        def settle(timer: Timer) -> None:
+            nonlocal settled
+            timer.cancel()
+            settled = True
+            for each in latest.values():
+                each()
+
         def listen(topic: str, record: type, read: Callable[[Any], Any], raw: bool) -> None:
-            hear, quality = partial(take, topic, read), topics.quality(topics.LATEST)
+            hear, quality = partial(arrive, topic, read), topics.quality(topics.LATEST)
             self.create_subscription(message_type(record), topic, hear, quality, raw=raw)
 
         for topic, record in inputs.items():

@@ -25,14 +25,20 @@ class Snapshot:
             self._latest = stamp_ns
         self._kept.append((topic, data, stamp_ns, sequence))
         self._latest = max(self._latest, stamp_ns)
-        while self._kept and self._kept[0][2] <= self._latest - self._duration_ns:
+        while self._kept and self._is_over(self._kept[0][2]):
             self._kept.popleft()
 
     def trigger(self) -> int:
         """Write what is kept, and keep nothing any more; returns the number of messages written."""
-        count = len(self._kept)
         self._bag.begin_file()
+        count = 0
         while self._kept:
-            self._bag.write(*self._kept.popleft())
+            topic, data, stamp_ns, sequence = self._kept.popleft()
+            if not self._is_over(stamp_ns):  # as one may be that came after a younger one of another topic
+                self._bag.write(topic, data, stamp_ns, sequence)
+                count += 1
         self._bag.flush()
         return count
+
+    def _is_over(self, stamp_ns: int) -> bool:
+        return stamp_ns <= self._latest - self._duration_ns

@@ -50,11 +50,13 @@ def kept_of(directory: Path, data: bytes, stamps: list[tuple[str, int]]) -> tupl
     return count, bag.start_ns // NANOSECONDS, bag.end_ns // NANOSECONDS
 
 
-def test_a_message_from_long_ago_costs_nothing_of_what_is_kept(tmp_path, flight) -> None:
+def test_a_message_that_comes_late_counts_by_its_stamp(tmp_path, flight) -> None:
     stamps = [("/clock", second) for second in range(100)]
-    late = [*stamps[:90], ("/late", 3), *stamps[90:]]
+    long_ago = [*stamps[:90], ("/late", 3), *stamps[90:]]
+    just_over = [*stamps[:81], ("/late", 79), *stamps[81:]]
     assert kept_of(tmp_path / "run", flight[0].data, stamps) == (20, 80, 99)
-    assert kept_of(tmp_path / "late", flight[0].data, late) == (21, 3, 99)
+    assert kept_of(tmp_path / "late", flight[0].data, long_ago) == (20, 80, 99)
+    assert kept_of(tmp_path / "over", flight[0].data, just_over) == (20, 80, 99)
 
 
 def test_a_run_that_begins_anew_is_kept_as_long_as_the_first(tmp_path, flight) -> None:
