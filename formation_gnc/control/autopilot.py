@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, make_dataclass
-from math import isfinite
+from math import inf, isfinite
 from typing import Any
 
 import numpy as np
@@ -102,6 +102,9 @@ class Autopilot(Part[Any, Controller]):
         for name, state in (("estimate", estimate.relative_state), ("target", target.relative_state)):
             if not all(map(isfinite, state.tolist())):
                 return Command(np.zeros(3), fallback=f"{name} not finite: no thrust")
+        if not 0.0 < estimate.mass < inf:
+            reason = f"mass is {estimate.mass:g} kg; it must be positive and finite: no thrust"
+            return Command(np.zeros(3), fallback=reason)
         try:
             with np.errstate(all="ignore"):
                 command = self.configuration.design.command(estimate, target)

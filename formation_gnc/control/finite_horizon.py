@@ -273,10 +273,6 @@ class FiniteHorizonController(Controller):
     def _answer(self, flight: _Flight, estimate: Estimate, target: Target, to_go: float) -> Plan:
         """A plan for what is left, with its failure named."""
         nothing = np.zeros((1, 3))
-        if not 0.0 < estimate.mass < math.inf:
-            return Plan(
-                nothing, to_go, 0, f"no plan: mass is {estimate.mass:g} kg; it must be positive and finite"
-            )
         steps = max(1, math.ceil(to_go / self._parameters.step - 1e-9))
         if steps > MOST_STEPS:
             return Plan(nothing, to_go, 0, f"{steps} steps to plan, at most {MOST_STEPS} allowed")

@@ -22,7 +22,7 @@ TOLERANCE = 1e-3
 class StaticProgrammingParameters(FiniteHorizonParameters):
     """Those of every finite horizon, and a bound on the rounds."""
 
-    iterations: int = parameter(
+    most_iterations: int = parameter(
         10, minimum=1, maximum=100, in_flight=True, doc="rounds after which a plan has failed"
     )
 
@@ -44,7 +44,7 @@ class StaticProgrammingController(FiniteHorizonController):
             weights = Weights.scaled(*self._cost, task.step)
             gain = stationary_gain(*self._hill.discretise(0.0, task.step), weights)
             task = replace(task, guess=regulated(task, self._hill, gain))
-        return self.program(task, self._tolerance, self._parameters.iterations)
+        return self.program(task, self._tolerance, self._parameters.most_iterations)
 
     @abstractmethod
     def program(self, task: Task, tolerance: Vector, most_iterations: int) -> StaticPlan:

@@ -11,6 +11,7 @@ from hypothesis.extra import numpy as hnp
 from formation_gnc.control.autopilot import Autopilot, ControllerParameters
 from formation_gnc.control.finite_horizon import FiniteHorizonController
 from formation_gnc.control.registry import ALGORITHMS
+from formation_gnc.interface import NANOSECONDS
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.parameters import load
 
@@ -100,6 +101,22 @@ def test_after_whatever_came_in_the_law_flies_on(algorithm, estimate, target):
         seen = estimate(wrong, 10.0 * tick, mass, CHIEF)
         thrust, _ = pilot.on_tick(seen, target(time=10.0 * tick))
     assert thrust.force.any() == (algorithm != "coast")
+
+
+@pytest.mark.parametrize("mass", [-100.0, 0.0, np.inf, np.nan])
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_with_a_mass_that_none_has_nothing_is_thrust_and_the_law_flies_on(algorithm, mass, estimate, target):
+    """A force is mass times acceleration: with a mass below zero every law would thrust the wrong way."""
+    pilot, away = autopilot(algorithm), [5.0, -8.0, 0.0, 0.0, 0.0, 0.0]
+    reason = f"mass is {mass:g} kg; it must be positive and finite: no thrust"
+    for time in (0.0, 10.0):
+        thrust, status = pilot.on_tick(estimate(away, time, mass, CHIEF), target(time=time))
+        assert not thrust.force.any()
+        assert status.fallback == reason
+    thrust, _ = pilot.on_tick(estimate(away, 20.0, chief=CHIEF), target(time=20.0))
+    assert thrust.force.any() == (algorithm != "coast")
+    first, over = [event for event in pilot.take_events() if event.kind == "fallback"]
+    assert (first.detail, over.time) == (reason, 20 * NANOSECONDS)
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)

@@ -107,14 +107,6 @@ def test_a_plan_that_does_not_count_is_named_and_another_law_flies(
     np.testing.assert_allclose(commands[-1].force, [0.005, 0, 0])
 
 
-@pytest.mark.parametrize("mass", [np.nan, np.inf, 0.0, -100.0])
-def test_a_mass_that_none_has_is_named(mass, mission, vehicle, estimate, target):
-    command = Told(mission, vehicle, np.array([2e-4, 0, 0])).command(  # twice the limit
-        estimate([5.0, 0, 0, 0, 0, 0], mass=mass, chief=CHIEF), target()
-    )
-    assert command.fallback == f"no plan: mass is {mass:g} kg; it must be positive and finite; LQR flies"
-
-
 @pytest.mark.parametrize("before", FINITE_HORIZONS)
 @pytest.mark.parametrize("after", FINITE_HORIZONS)
 def test_a_swap_begins_a_reconfiguration_and_new_parameters_go_on(
