@@ -1,8 +1,8 @@
-"""The least integral of the squared acceleration that takes a deputy from one state to another: the truth
+"""The least cost that takes a deputy from one orbit to another, in a given time or without one: the truth
 that laws are measured by.
 
 Independent of the package's relative-motion models: Pontryagin's conditions in the inertial frame, with the
-potential of a point mass and J2 written out here, solved by shooting with SciPy's integrator.
+potential of a point mass and J2 written out here, solved by shooting and by collocation with SciPy.
 """
 
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
+from scipy.integrate import solve_bvp, solve_ivp
 
 from formation_gnc.orbit.constants import EARTH_RADIUS, J2
 
@@ -25,8 +25,8 @@ class Field:
     oblate: bool
 
     def acceleration(self, place: Any) -> Any:
-        """(3,) m/s^2 at a place (3,), m, real or complex."""
-        square = np.sum(place * place)
+        """(3, ...) m/s^2 at places (3, ...), m, real or complex."""
+        square = np.sum(place * place, axis=0)
         pull = -self.mu / square**1.5 * place
         if self.oblate:
             sine = place[2] ** 2 / square
@@ -34,10 +34,14 @@ class Field:
             pull = pull - 1.5 * J2 * self.mu * EARTH_RADIUS**2 / square**2.5 * shape
         return pull
 
-    def gradient(self, place: Array) -> Array:
-        """(3, 3) of the acceleration, by complex steps: no second formula to get wrong."""
-        columns = [self.acceleration(place + 1e-20j * axis).imag / 1e-20 for axis in np.eye(3)]
-        return np.array(columns).T
+    def turn(self, place: Array, along: Array) -> Array:
+        """(3, ...) gradient at places, which is symmetric, times vectors: a complex step, so that there is no
+        second formula to get wrong."""
+        return np.asarray(self.acceleration(place + 1e-20j * along).imag / 1e-20)
+
+    def rate(self, _: float, state: Array) -> Array:
+        """(6,) rate of change of an inertial state in free flight."""
+        return np.concatenate([state[3:], self.acceleration(state[:3])])
 
 
 @dataclass(frozen=True)
@@ -55,14 +59,7 @@ class Optimum:
 
 def free_flight(field: Field, state: Array, duration: float) -> Array:
     """(6,) inertial state after a free flight, s."""
-    answer = solve_ivp(
-        lambda _, s: np.concatenate([s[3:], field.acceleration(s[:3])]),
-        (0.0, duration),
-        state,
-        method="DOP853",
-        rtol=1e-13,
-        atol=1e-9,
-    )
+    answer = solve_ivp(field.rate, (0.0, duration), state, method="DOP853", rtol=1e-13, atol=1e-9)
     return np.asarray(answer.y[:, -1])
 
 
@@ -79,8 +76,8 @@ def optimum(field: Field, start: Array, goal: Array, duration: float) -> Optimum
     scale = np.repeat([duration**-3.0, duration**-2.0], 3)  # of the costate, per metre
 
     def rate(_: float, s: Array) -> Array:
-        force, gradient = field.acceleration(s[:3]), field.gradient(s[:3])
-        return np.concatenate([s[3:6], force - s[9:12], -gradient.T @ s[9:12], -s[6:9], [s[9:12] @ s[9:12]]])
+        force, turn = field.acceleration(s[:3]), field.turn(s[:3], s[9:12])
+        return np.concatenate([s[3:6], force - s[9:12], -turn, -s[6:9], [s[9:12] @ s[9:12]]])
 
     def shoot(costate: Array) -> tuple[Array, float]:
         joint = np.concatenate([start, scale * costate, [0.0]])
@@ -96,3 +93,43 @@ def optimum(field: Field, start: Array, goal: Array, duration: float) -> Optimum
         response = np.column_stack([(shoot(costate + probe * axis)[0] - miss) / probe for axis in np.eye(6)])
         costate = costate - np.linalg.solve(response, miss)
     raise RuntimeError(f"shooting has not converged: {np.linalg.norm(miss):.3g} m left")
+
+
+def regulated(field: Field, start: Array, goal: Array, duration: float, tau: float) -> float:
+    """The least integral (m^2/s^3) of |u|^2 + |e|^2 / tau^4, e the way from a free flight, with a free end.
+
+    Start and goal are inertial states (6,) at the beginning, duration and tau are s. As above, but with
+    p_r' = -G(x)' p_v - e / tau^4 and no costate at the end, for the way itself, in units of tau and of the
+    way at the start: by collocation, since what shooting leaves would grow as exp(duration / tau).
+
+    Raises:
+        RuntimeError: collocation does not converge.
+    """
+    flight = solve_ivp(
+        field.rate, (0.0, duration), goal, method="DOP853", rtol=1e-13, atol=1e-9, dense_output=True
+    ).sol
+    size = float(np.linalg.norm((start - goal)[:3]))
+    first = (start - goal) / size * np.repeat([1.0, tau], 3)
+
+    def rate(moment: Array, s: Array) -> Array:
+        way, speed, by_place, by_speed = s.reshape(4, 3, -1)
+        aim = flight(tau * moment)[:3]
+        pull = (field.acceleration(aim + size * way) - field.acceleration(aim)) * tau**2 / size
+        turn = field.turn(aim + size * way, by_speed) * tau**2
+        return np.concatenate([speed, pull - by_speed, -turn - way, -by_place])
+
+    moments = np.linspace(0.0, duration / tau, 201)
+    guess = np.concatenate([np.outer(first, np.exp(-moments)), np.zeros((6, len(moments)))])
+    found = solve_bvp(
+        rate,
+        lambda begin, end: np.concatenate([begin[:6] - first, end[6:]]),
+        moments,
+        guess,
+        tol=1e-7,
+        max_nodes=20_000,
+    )
+    if found.status != 0:
+        raise RuntimeError(found.message)
+    fine = np.linspace(0.0, duration / tau, 20_001)
+    path = found.sol(fine)
+    return size**2 / tau**3 * float(np.trapezoid(np.sum(path[:3] ** 2 + path[9:] ** 2, axis=0), fine))
