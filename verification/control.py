@@ -11,14 +11,11 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure as Drawing
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 
 from formation_gnc.control.controller import Controller, Vehicle
 from formation_gnc.control.hinf import HInfinityController, HinfParameters
 from formation_gnc.control.lqr import LinearQuadraticRegulator, LqrParameters
-from formation_gnc.control.mpc import ModelPredictiveController, MpcParameters
 from formation_gnc.control.riccati import Weights, stationary_gain
 from formation_gnc.interface import NANOSECONDS, Estimate, Target
 from formation_gnc.mission import Mission, Orbit
@@ -28,7 +25,8 @@ from formation_gnc.orbit.frames import hill_rotation, inertial_from_relative, re
 from formation_gnc.orbit.propagation import advance_with_transition
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.schweighart_sedwick import CircularReference, SchweighartSedwickModel
-from verification.figure import TABLE, Figure, failures
+from verification.acquisitions import kremmydas, least_delta_v
+from verification.figure import TABLE, Figure, failures, save
 from verification.laws import all_laws
 
 mpl.use("Agg")
@@ -106,24 +104,6 @@ def neokleous_hinf(limit: float, shift: float = 0.1) -> HInfinityController:
     return HInfinityController(parameters, GEO, Vehicle(GEO_MASS, np.full(3, limit)))
 
 
-def least_thrust(start: Array, ticks: int) -> float:
-    """Least sum of magnitudes of accelerations, m/s^2, that bring a state to rest in so many ticks, on Hill's
-    model."""
-    model = HillModel(GEO_RATE)
-    block = 10  # held over ten ticks: fewer unknowns, and hardly less freedom
-    phi, gamma = model.discretise(0.0, block * GEO.tick)
-    count = ticks // block
-    forced, response = np.zeros((6, 3 * count)), gamma
-    for index in reversed(range(count)):
-        forced[:, 3 * index : 3 * index + 3] = response
-        response = phi @ response
-    free = np.linalg.matrix_power(phi, count) @ start
-    unit = np.repeat([1.0, 1.0 / MINUTE], 3)
-    rows = np.hstack([forced, -forced]) / unit[:, None]
-    found = linprog(np.ones(6 * count), A_eq=rows * 1e-3, b_eq=-free / unit * 1e-3, bounds=(0.0, None))
-    return block * float(found.fun)
-
-
 def neokleous(directory: Path) -> tuple[str, list[Figure]]:
     """Printed eigenvalues, the 100 m scenario of Figs. 6.1-6.4 and the 1 km scenario of Figs. 6.5-6.8."""
     figures = []
@@ -192,7 +172,9 @@ def neokleous(directory: Path) -> tuple[str, list[Figure]]:
         panels[0, column].set(title=f"100 m: {name}", ylabel="abs(error), m", xlabel="min")
         panels[1, column].plot(minutes[:-1], forces)
         panels[1, column].set(ylabel="force, N", xlabel="min", xlim=(0, 60))
-    least = least_thrust(start, 1000) * MINUTE**2
+    # Held over ten ticks: fewer unknowns, and hardly less freedom.
+    least = least_delta_v(HillModel(GEO_RATE), start, origin, 10.0 * GEO.tick, np.full(100, True), math.inf)
+    least *= MINUTE**2 / GEO.tick
     share = least / totals["LQR, R = 200 I"]
     best_gamma = neokleous_hinf(math.inf).best_gamma
     lines += [
@@ -336,152 +318,6 @@ def roberts(directory: Path) -> tuple[str, list[Figure]]:
         "",
     ]
     return "\n".join(lines), figures
-
-
-NETSAT = Mission(Orbit(7078137.0), tick=240.0)
-NETSAT_MASS, NETSAT_LIMIT = 1.5, 8e-6
-
-
-def hill_axes(state: list[float]) -> Array:
-    """From his axes (along-track, against the normal, down) and order (x, y, z, dx, dy, dz)."""
-    x, y, z, dx, dy, dz = state
-    return np.array([-z, x, -y, -dz, dx, -dy])
-
-
-def tetrahedral(size: float, rate: float) -> list[Array]:
-    """Tetrahedral formation as in his listing."""
-    a = 0.3 * math.sqrt(3.0) / 4.0 * 2.0 * size
-    root = math.sqrt(2.0)
-    return [
-        hill_axes(
-            [-a * 2 / 3, -a * math.sqrt(3), 2 * root * a / 3, 4 * rate * root * a / 3, 0, rate * a / 3]
-        ),
-        hill_axes([2 * a, a / math.sqrt(3), 0, 0, 2 * root * a * rate / math.sqrt(3), -rate * a]),
-        hill_axes([-size, 0, 0, 0, 0, 0]),
-        hill_axes([size, 0, 0, 0, 0, 0]),
-    ]
-
-
-def plane_and_one(size: float, across: float, rate: float) -> list[Array]:
-    """Three in the plane, one out of it; the three a third of an orbit apart, with the sign that centres the
-    ellipse."""
-    model = HillModel(rate)
-    first = hill_axes([size, 0, 0, 0, 0, -size * rate / 2])
-    three = [model.propagate(0.0, first, index * math.tau / rate / 3.0) for index in range(3)]
-    return [*three, hill_axes([0, across, 0, 0, 0, 0])]
-
-
-def netsat(weight: float) -> MpcParameters:
-    """Listing of netSATmpc: squared weights over scales of 4 m (along-track) and 2 m, their rates and 2e-7
-    m/s^2."""
-    return MpcParameters(
-        step=240.0,
-        horizon=33,
-        control_horizon=18,
-        replan_interval=25 * 240.0,
-        weighting="terminal",
-        position_error=(2.0 / weight, 4.0 / weight, 2.0 / weight),
-        velocity_error=(0.002 / weight, 0.004 / weight, 0.002 / weight),
-        thrust=(NETSAT_MASS * 2e-7,) * 3,
-    )
-
-
-def kremmydas(directory: Path) -> tuple[str, list[Figure]]:
-    """Tetrahedral to three in the plane and one out of it: 8 uN, eclipse in the last third, 100 orbits."""
-    rate = NETSAT.mean_motion
-    model = HillModel(rate)
-    ticks = 100 * 25
-    starts, ends = tetrahedral(1000.0, rate), plane_and_one(1000.0, 600.0, rate)
-    lines = [
-        "## Kremmydas, four satellites at 700 km, tetrahedral to three in the plane and one out of it",
-        "",
-        "8 uN on 1.5 kg, 240 s steps, 18 with thrust in 25 (an orbit), horizon 33; one plan an orbit; on",
-        "Hill's model, as there. The target is carried to the end of the horizon. Fixed order of",
-        "satellites, phase as it starts, 600 m across the track. Delta-v is the sum over the axes.",
-        "",
-        "| weight | satellite | error, m: start | orbit 50 | orbit 100 | delta-v, mm/s | 10 m at orbit |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    plot, panels = plt.subplots(1, 3, figsize=(19, 5))
-    worst: dict[float, float] = {}
-    spent: dict[float, float] = {}
-    for weight in (1.7, 17.0, 170.0):
-        for satellite, (start, end) in enumerate(zip(starts, ends, strict=True), start=1):
-            law = ModelPredictiveController(
-                netsat(weight), NETSAT, Vehicle(NETSAT_MASS, np.full(3, NETSAT_LIMIT))
-            )
-            state, errors, forces = start, [], []
-            for tick in range(ticks):
-                time = 240.0 * tick
-                goal = model.propagate(0.0, end, time)
-                errors.append(np.linalg.norm((state - goal)[:3]))
-                aim = Target(round(time * NANOSECONDS), "", goal, 240.0, np.empty((0, 6)))
-                command = law.command(estimate(time, state, np.zeros(6), NETSAT_MASS), aim)
-                forces.append(command.force)
-                state = model.propagate(0.0, state, 240.0, command.force / NETSAT_MASS)
-            history, thrust = np.array(errors), np.array(forces)
-            delta_v = 1e3 * np.abs(thrust).sum() * 240.0 / NETSAT_MASS
-            far = np.flatnonzero(history > 10.0)
-            arrived = f"{(far[-1] + 1) // 25}" if far[-1] < ticks - 1 else "no"
-            worst[weight] = max(worst.get(weight, 0.0), history[-25:].max())
-            spent[weight] = spent.get(weight, 0.0) + delta_v
-            lines.append(
-                f"| {weight:g} | {satellite} | {history[0]:.0f} | {history[1250:1275].max():.3g} | "
-                f"{history[-25:].max():.3g} | {delta_v:.1f} | {arrived} |"
-            )
-            orbits = np.arange(ticks) / 25.0
-            if weight != 170.0:
-                panels[0 if weight == 1.7 else 1].semilogy(orbits, history, label=f"satellite {satellite}")
-            if weight == 17.0 and satellite == 1:
-                panels[2].step(
-                    orbits[:100],
-                    1e6 * thrust[:100],
-                    where="post",
-                    label=["radial", "along-track", "cross-track"],
-                )
-            dark = np.arange(ticks) % 25 >= 18
-            assert not thrust[dark].any()
-            assert np.abs(thrust).max() <= NETSAT_LIMIT
-    for panel, title in zip(
-        panels, ("weight 1.7, as printed", "weight 17", "thrust of satellite 1, weight 17"), strict=True
-    ):
-        panel.set(
-            xlabel="orbits", title=title, ylabel="position error, m" if title[0] == "w" else "force, uN"
-        )
-        panel.legend(loc="upper right")
-        if panel is not panels[2]:
-            panel.set_ylim(1e-3, 1e4)
-    save(plot, directory / "control_kremmydas.png")
-    figures = [
-        Figure(
-            "printed weight 1.7: largest error in the 100th orbit",
-            "not printed",
-            worst[1.7],
-            "m",
-            10.0,
-            1000.0,
-        ),
-        Figure("weight 17: the same", "not printed", worst[17.0], "m", 0.0, 1.0),
-        Figure(
-            "weight 17: delta-v of all four over weight 1.7's",
-            "not printed",
-            spent[17.0] / spent[1.7],
-            "",
-            0.8,
-            2.0,
-        ),
-    ]
-    lines += ["", TABLE, *(figure.row for figure in figures), "", "![Kremmydas](control_kremmydas.png)", ""]
-    return "\n".join(lines), figures
-
-
-def save(plot: Drawing, path: Path) -> None:
-    """Write a plot without anything that changes from one run to the next."""
-    for panel in plot.axes:
-        panel.grid(alpha=0.3)
-    plot.tight_layout()
-    plot.savefig(path, dpi=110, metadata={"Software": None})
-    plt.close(plot)
 
 
 def main(directory: Path) -> int:
