@@ -14,7 +14,7 @@ def main(names: list[str]) -> int:
     """Write the pages of the modules here that have a `main`; 1 when a figure is outside its tolerance."""
     failures = 0
     for name in names or sorted(module.name for module in pkgutil.iter_modules(verification.__path__)):
-        if name in ("__main__", "laws"):  # laws accepts the table that control's page shows: no page of its own
+        if name in ("__main__", "laws"):  # laws' own `main` accepts the table that control shows
             continue
         page = getattr(importlib.import_module(f"verification.{name}"), "main", None)
         if page is not None:
