@@ -4,6 +4,7 @@ from formation_gnc.control.adaptive_lqr import AdaptiveLinearQuadraticRegulator
 from formation_gnc.control.asre import Asre
 from formation_gnc.control.coast import Coast
 from formation_gnc.control.controller import Controller
+from formation_gnc.control.finite_horizon import FiniteHorizonController
 from formation_gnc.control.gmpsp import GmpspController
 from formation_gnc.control.hinf import HInfinityController
 from formation_gnc.control.lqr import LinearQuadraticRegulator
@@ -24,3 +25,6 @@ ALGORITHMS: dict[str, type[Controller]] = {
     "asre": Asre,
     "adaptive_lqr": AdaptiveLinearQuadraticRegulator,
 }
+
+FINITE_HORIZONS = [name for name, law in ALGORITHMS.items() if issubclass(law, FiniteHorizonController)]
+"""Those of them that fly a reconfiguration in a given time."""

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from formation_gnc.control.autopilot import Autopilot, ControllerParameters
-from formation_gnc.control.finite_horizon import FiniteHorizonController
-from formation_gnc.control.registry import ALGORITHMS
+from formation_gnc.control.registry import ALGORITHMS, FINITE_HORIZONS
 from formation_gnc.interface import NANOSECONDS
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.parameters import load
@@ -20,7 +19,6 @@ LIMIT = np.array([0.01, 0.02, 0.0])
 """N; and one axis that cannot push."""
 STRONG = np.full(3, 50.0)
 """N: plans to go some kilometres in 300 s ask less."""
-FINITE_HORIZONS = [name for name, law in ALGORITHMS.items() if issubclass(law, FiniteHorizonController)]
 
 
 def autopilot(algorithm: str, **values: Any) -> Autopilot:

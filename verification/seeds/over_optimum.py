@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from formation_gnc.control.controller import Command, Controller, Vehicle
-from formation_gnc.control.finite_horizon import PLAN_MODELS, FiniteHorizonController
-from formation_gnc.control.registry import ALGORITHMS
+from formation_gnc.control.finite_horizon import PLAN_MODELS
+from formation_gnc.control.registry import ALGORITHMS, FINITE_HORIZONS
 from formation_gnc.guidance.relative_orbit import RelativeOrbit, RelativeOrbitParameters
 from formation_gnc.interface import NANOSECONDS, NOBODY, Target
 from formation_gnc.mission import Mission
@@ -34,7 +34,6 @@ INCLINATION = math.radians(60.0)
 TAU = 1000.0
 """s: 1 / tau^4 is what the square of a distance counts to regulators, against that of an acceleration."""
 HORIZON = 14.0 * TAU
-PLANNERS = [name for name, law in ALGORITHMS.items() if issubclass(law, FiniteHorizonController)]
 REGULATORS = ("lqr", "sdre", "adaptive_lqr")
 
 Case = tuple[float, bool, float]
@@ -188,7 +187,7 @@ def limits(name: str, ratios: dict[Case, float], greatest: tuple[float, float]) 
 def plans() -> tuple[list[str], list[Figure]]:
     """Effort over the optimum, miss and iterations, by law and case."""
     best = {case: least(*case) for case in CASES}
-    flown = {(name, case): planned(name, *case) for case in CASES for name in PLANNERS}
+    flown = {(name, case): planned(name, *case) for case in CASES for name in FINITE_HORIZONS}
     lines = [
         "## Effort over the optimum",
         "",
@@ -200,12 +199,12 @@ def plans() -> tuple[list[str], list[Figure]]:
         "time, iterations of the first plan and the most of a later one. Time per plan in each of these",
         "cases: `make bench`.",
         "",
-        "| e | J2 | to | optimum | " + " | ".join(PLANNERS) + " |",
-        "|---" * (4 + len(PLANNERS)) + "|",
+        "| e | J2 | to | optimum | " + " | ".join(FINITE_HORIZONS) + " |",
+        "|---" * (4 + len(FINITE_HORIZONS)) + "|",
     ]
     for case in CASES:
         cells = []
-        for name in PLANNERS:
+        for name in FINITE_HORIZONS:
             spent, miss, iterations = flown[name, case]
             cells.append(f"{spent / best[case]:.5f}, {miss:.2g} m, {iterations[0]} and {max(iterations[1:])}")
         lines.append(row(case, best[case], cells))
@@ -219,7 +218,7 @@ def plans() -> tuple[list[str], list[Figure]]:
         "",
     ]
     figures = []
-    for name in PLANNERS:
+    for name in FINITE_HORIZONS:
         frozen = name == "sdre_finite"
         ratios = {case: flown[name, case][0] / best[case] for case in CASES}
         figures += limits(name, ratios, (5e-4, 0.01 if frozen else 5e-4))
