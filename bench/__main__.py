@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from bench import control, dynamics, fleet, graph, navigation, recording
+from bench import control, dynamics, fleet, graph, navigation, plans, recording
 from bench.result import Result
 
 BENCHMARKS = {
@@ -18,6 +18,7 @@ BENCHMARKS = {
     "dynamics": dynamics.run,
     "navigation": navigation.run,
     "control": control.run,
+    "plans": plans.run,
     "recording": recording.run,
 }
 OUTPUT = Path("build/bench.json")
