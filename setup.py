@@ -5,6 +5,12 @@ from setuptools import find_packages, setup
 NAME = "formation_gnc"
 NODES = ["plant", "navigation", "guidance", "controller", "satellite", "display", "recorder", "replay"]
 
+
+def files(folder: str, pattern: str) -> list[str]:
+    """Files to install; a link that a build of before left of one that is gone is none."""
+    return sorted(str(path) for path in Path(folder).glob(pattern) if path.exists())
+
+
 setup(
     name=NAME,
     version="0.1.0",
@@ -13,8 +19,8 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
         ("bin", ["scripts/formation-gnc"]),  # colcon puts bin on PATH, and leaves the nodes off it
-        (f"share/{NAME}/params", sorted(str(path) for path in Path("params").glob("*.yaml"))),
-        (f"share/{NAME}/launch", sorted(str(path) for path in Path("launch").glob("*.py"))),
+        (f"share/{NAME}/params", files("params", "*.yaml")),
+        (f"share/{NAME}/launch", files("launch", "*.py")),
     ],
     install_requires=["setuptools"],
     zip_safe=True,

@@ -1,6 +1,7 @@
 """The packages as colcon sees them, the environment as a user gets it, and what a lacking machine is told."""
 
 import ast
+import importlib
 import os
 import re
 import runpy
@@ -8,12 +9,16 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 from xml.etree import ElementTree
 
 import pytest
 
 import formation_gnc
+from formation_gnc.sil.scenario import load_scenario
 
 ROOT = Path(__file__).resolve().parents[1]
 NODES = {"plant", "navigation", "guidance", "controller", "recorder"}
@@ -197,11 +202,85 @@ def test_the_lock_pins_every_package_with_its_hashes():
             ]
 
 
+LAUNCH_FILE = ROOT / "launch/sil.launch.py"
+
+
+def started(context: Any, **arguments: str) -> list[Any]:
+    """Run the launch file with arguments, as `ros2 launch` would, up to the nodes that it would start."""
+    description = runpy.run_path(str(LAUNCH_FILE))["generate_launch_description"]()
+    *declared, function = description.entities
+    for each in declared:
+        each.visit(context)
+    context.launch_configurations.update(arguments)
+    return function.execute(context)
+
+
 def test_the_launch_file_starts_every_node():
     pytest.importorskip("launch_ros", reason="launch comes with an installed ROS only")
-    launch_file = ROOT / "launch/leader_follower.launch.py"
-    description = runpy.run_path(str(launch_file))["generate_launch_description"]()
-    assert {node.node_executable for node in description.entities} == NODES
+    nodes = started(importlib.import_module("launch").LaunchContext())
+    assert {node.node_executable for node in nodes} == NODES
+
+
+@pytest.fixture
+def launch_double(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    """A stand-in for the launch packages, with as much of them as the launch file uses; gives the context."""
+
+    class Declared(SimpleNamespace):
+        def visit(self, context: SimpleNamespace) -> None:
+            assert self.default_value in self.__dict__.get("choices", [self.default_value])
+            context.launch_configurations.setdefault(self.name, self.default_value)
+
+    class Function(SimpleNamespace):
+        def execute(self, context: SimpleNamespace) -> list[Any]:
+            return self.function(context)
+
+    def configuration(name: str) -> SimpleNamespace:
+        return SimpleNamespace(perform=lambda context: context.launch_configurations[name])
+
+    doubles = {
+        "launch": {
+            "LaunchContext": SimpleNamespace,
+            "LaunchDescription": lambda entities: SimpleNamespace(entities=entities),
+        },
+        "launch.actions": {
+            "DeclareLaunchArgument": lambda name, **options: Declared(name=name, **options),
+            "OpaqueFunction": Function,
+            "Shutdown": SimpleNamespace,
+        },
+        "launch.substitutions": {"LaunchConfiguration": configuration},
+        "launch_ros": {},
+        "launch_ros.actions": {"Node": SimpleNamespace},
+        "ament_index_python": {},
+        "ament_index_python.packages": {"get_package_share_directory": lambda _: ROOT},
+    }
+    for name, contents in doubles.items():
+        monkeypatch.setitem(sys.modules, name, SimpleNamespace(**contents))
+    return SimpleNamespace(launch_configurations={})
+
+
+@pytest.mark.parametrize("composed", ["false", "true"])
+@pytest.mark.parametrize("scenario", sorted(path.stem for path in (ROOT / "params").glob("*.yaml")))
+def test_the_launch_file_starts_all_deputies_of_any_scenario(launch_double, scenario, composed):
+    nodes = started(launch_double, scenario=scenario, composed=composed)
+    deputies = load_scenario(scenario).plant.deputies
+    parts = {"satellite"} if composed == "true" else {"navigation", "guidance", "controller"}
+    assert {(node.namespace, node.executable) for node in nodes} == {
+        ("", "plant"),
+        ("", "recorder"),
+        *product(deputies, parts),
+    }
+    assert len(nodes) == 2 + len(deputies) * len(parts)
+    assert {path for node in nodes for path in node.parameters} == {str(ROOT / f"params/{scenario}.yaml")}
+    assert [node.executable for node in nodes if hasattr(node, "on_exit")] == ["plant"]
+
+
+def test_the_launch_file_takes_a_path_and_by_itself_flies_the_default_scenario(launch_double, tmp_path):
+    assert {node.executable for node in started(launch_double)} == NODES
+    path = tmp_path / "own.yaml"
+    path.write_text("/plant: {ros__parameters: {duration: 9.0}}\n")
+    nodes = started(launch_double, scenario=str(path))
+    assert {node.namespace for node in nodes} == {"", "deputy1"}
+    assert nodes[0].parameters == [str(path)]
 
 
 @needs_set_up
