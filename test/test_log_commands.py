@@ -174,24 +174,62 @@ def test_swaps_by_schedule_and_by_hand_are_flown_again_at_their_tick(
     assert not {topic for topic, _ in said} & {topic for topic, _ in outputs if topic != "/events"}
 
 
-def test_an_answer_to_what_the_bag_lacks_is_taken_as_recorded_and_told(
-    flown: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    whole = Bag(flown)
-    with BagWriter(tmp_path / "lacking", whole.metadata) as writer:
-        for topic in whole.topics:
-            schema, channel = whole.definition(topic)
+def rewritten(
+    bag: Bag, directory: Path, numbers: dict[tuple[str, int], int], metadata: dict[str, dict[str, str]]
+) -> Path:
+    """A copy with other numbers of messages by topic and stamp, 0 to leave one out, and more metadata."""
+    with BagWriter(directory, bag.metadata | metadata) as writer:
+        for topic in bag.topics:
+            schema, channel = bag.definition(topic)
             assert schema is not None
             writer.add_defined_topic(
                 topic, TopicDefinition(schema.name, schema.data, metadata=channel.metadata)
             )
-        for topic, data, stamp in whole.messages():
-            if (topic, stamp) != ("/deputy1/estimate", 50 * NANOSECONDS):
-                writer.write(topic, data, stamp, 2)
-    status, again = replayed(tmp_path / "lacking", tmp_path / "again", "--nodes", "guidance,controller")
+        for topic, data, stamp in bag.messages():
+            if number := numbers.get((topic, stamp), 2):
+                writer.write(topic, data, stamp, number)
+    return directory
+
+
+def test_an_answer_to_what_the_bag_lacks_is_taken_as_recorded_and_told(
+    flown: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lost = {("/deputy1/estimate", 50 * NANOSECONDS): 0}
+    lacking = rewritten(Bag(flown), tmp_path / "lacking", lost, {})
+    status, again = replayed(lacking, tmp_path / "again", "--nodes", "guidance,controller")
     assert status == 0
     assert "2 answers as recorded" in capsys.readouterr().out
-    assert again.topics["/deputy1/thrust"].count == whole.topics["/deputy1/thrust"].count
+    assert again.topics["/deputy1/thrust"].count == Bag(flown).topics["/deputy1/thrust"].count
+
+
+def test_a_node_started_again_flies_with_what_it_was_started_with_then_if_the_bag_has_it(
+    flown: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    start, node = 50 * NANOSECONDS, "/deputy1/controller"
+    first = {("/deputy1/thrust", start): 1}
+    values = Bag(flown).metadata[f"parameters {node}"]
+    coast = {f"parameters {node} from {start}": values | {"algorithm": '"coast"'}}
+    for name, metadata in (("known", coast), ("unknown", {})):
+        bag = rewritten(Bag(flown), tmp_path / name, first, metadata)
+        status, again = replayed(bag, tmp_path / f"{name} again", "--nodes", "controller")
+        told = f"{node} was started again at 50 s; the bag lacks with which parameters"
+        said = capsys.readouterr().out
+        laws = again.arrays("/deputy1/status")["algorithm"].tolist()
+        if name == "known":  # LQR is what is recorded there
+            assert status == 1
+            assert told not in said
+            assert laws == ["lqr"] * 50 + ["coast"] * (len(laws) - 50)
+        else:
+            assert status == 0
+            assert told in said
+            assert set(laws) == {"lqr"}
+    # what somebody wants otherwise is so at every start
+    wanted = tmp_path / "wanted.yaml"
+    wanted.write_text("/**/controller: {ros__parameters: {algorithm: hinf}}")
+    _, again = replayed(
+        tmp_path / "known", tmp_path / "other", "--nodes", "controller", "--params", str(wanted)
+    )
+    assert set(again.arrays("/deputy1/status")["algorithm"].tolist()) == {"hinf"}
 
 
 def test_a_changed_replay_differs_where_it_was_changed_and_only_there(

@@ -12,6 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from formation_gnc.analysis.compare import gnc_topics
+from formation_gnc.recording.provenance import parameters_record, provenance
 from formation_gnc.recording.reader import Bag, identical
 from formation_gnc.sil.replay import KINDS, nodes_of, parameters_of, replay
 from formation_gnc.sil.scenario import given_to
@@ -40,7 +41,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Replay, record, compare."""
     from formation_gnc.nodes.record_in_process import InProcessRecorder, reader
-    from formation_gnc.recording.provenance import provenance
     from formation_gnc.recording.writer import BagWriter
 
     bag = Bag(options.recorded)
@@ -51,13 +51,13 @@ def run(options: argparse.Namespace) -> int:
     source = options.recorded.absolute()
     output = options.bag or source.with_name(f"{source.stem}_replay_{datetime.now(UTC):%Y-%m-%d_%H-%M-%S}")
     flown = {
-        f"parameters {node}": {name: json.dumps(value) for name, value in values.items()}
+        parameters_record(node): {name: json.dumps(value) for name, value in values.items()}
         for node, values in parameters.items()
     }
     origin = {"replay": {"source": source.name, "nodes": ", ".join(parameters)}}
     with BagWriter(output, bag.metadata | provenance() | flown | origin, bag.attachments) as writer:
         recorder = InProcessRecorder(writer)
-        orphans = replay(
+        remarks = replay(
             bag,
             parameters,
             reader(bag),
@@ -65,8 +65,8 @@ def run(options: argparse.Namespace) -> int:
             lambda topic, data, stamp: recorder.copy(bag, topic, data, stamp),
         )
     print(f"bag: {output}")
-    if orphans:
-        print(f"{orphans} answers as recorded, not flown: the bag lacks what they answer")
+    for remark in remarks:
+        print(remark)
     replayed = Bag(output)
     differences = identical(bag, replayed, gnc_topics(bag, replayed))
     for difference in differences:

@@ -14,6 +14,7 @@ from formation_gnc.interface import NANOSECONDS, Estimate, Matrix, Measurement, 
 from formation_gnc.navigation.navigator import NavigationParameters, Navigator
 from formation_gnc.parameters import leaves, load, read_yaml
 from formation_gnc.part import changes_told
+from formation_gnc.recording.provenance import parameters_record
 from formation_gnc.recording.reader import Bag
 
 
@@ -91,7 +92,7 @@ def compare(bag: Bag, deputy: str, overrides: Mapping[str, Any]) -> Comparison:
 
 def recorded_parameters(bag: Bag, node: str, overrides: Mapping[str, Any]) -> NavigationParameters:
     """What the node flew with at its start, with overrides on top."""
-    key = f"parameters {node}"
+    key = parameters_record(node)
     if key not in bag.metadata:
         raise ConfigurationError(f"{bag.path}: has no parameters of {node}")
     values = {name: loads(value) for name, value in bag.metadata[key].items()}

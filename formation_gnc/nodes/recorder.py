@@ -25,7 +25,7 @@ from formation_gnc.nodes.shell import ConfiguredNode, asked_to_stop, run
 from formation_gnc.parameters import parameter
 from formation_gnc.recording.layout import LAYOUT, foxglove_layout
 from formation_gnc.recording.loss import LossCounter
-from formation_gnc.recording.provenance import LOST, provenance
+from formation_gnc.recording.provenance import LOST, parameters_record, provenance
 from formation_gnc.recording.snapshot import Snapshot
 from formation_gnc.recording.writer import FLUSH_INTERVAL, BagWriter, Split
 
@@ -98,6 +98,7 @@ class RecorderNode(ConfiguredNode):
         self._losses: dict[str, LossCounter] = {}
         self._lost = 0
         self._askable: dict[str, AsyncParameterClient] = {}
+        self._unknown: dict[str, str] = {}
         self._asked: dict[str, float] = {}
         self._settings: dict[str, dict[str, Any]] = {}
         self._heard: dict[str, int] = {}
@@ -134,11 +135,13 @@ class RecorderNode(ConfiguredNode):
             node, _, kind = service.rpartition("/")
             if kind == "get_parameters" and node not in self._askable:
                 self._askable[node] = AsyncParameterClient(self, node)
-        for node, client in self._askable.items():
+                self._unknown[node] = parameters_record(node)
+        for node, record_name in self._unknown.items():
+            client = self._askable[node]
             is_due = monotonic() - self._asked.get(node, -ASK_AGAIN) >= ASK_AGAIN
-            if node not in self._settings and is_due and client.services_are_ready():
+            if is_due and client.services_are_ready():
                 self._asked[node] = monotonic()
-                self._ask_parameters(node, client)
+                self._ask_parameters(node, record_name)
         if self._knows_the_run():
             self._report()
         self._say_what_is_lost()
@@ -154,6 +157,8 @@ class RecorderNode(ConfiguredNode):
         self._counts[topic] = 0
         loss = self._losses[topic] = LossCounter(lambda: self.count_publishers(topic), latched)
         is_clock = topic == topics.CLOCK
+        namespace, _, name = topic.rpartition("/")
+        node = next((f"{namespace}/{part}" for part, answer in topics.PARTS.items() if answer == name), "")
         paced = is_clock or topic == topics.TRUTH or topic.endswith(f"/{topics.MEASUREMENT}")
 
         def hear(data: bytes, stamp: int, number: int | None) -> None:
@@ -161,6 +166,9 @@ class RecorderNode(ConfiguredNode):
             count = self._counts[topic] = self._counts[topic] + 1
             if number is not None:
                 loss.take(number)
+            if number == 1 and count > 1 and node in self._askable:  # it was started again
+                self._unknown[node] = parameters_record(node, stamp)
+                self._asked.pop(node, None)
             self._write(topic, data, stamp, number or count)
             if paced:
                 self._heard[topic] = stamp
@@ -194,31 +202,33 @@ class RecorderNode(ConfiguredNode):
             response.message = str(self.failure)
         return response
 
-    def _ask_parameters(self, node: str, client: AsyncParameterClient) -> None:
-        """Ask a node for all its parameters, for the record."""
+    def _ask_parameters(self, node: str, record_name: str) -> None:
+        """Ask a node for all its parameters, for the record of this name."""
+        client = self._askable[node]
 
         def on_list(answer: Future) -> None:
             names = list(answer.result().result.names)
             client.get_parameters(names, callback=lambda values: on_values(names, values))
 
         def on_values(names: list[str], answer: Future) -> None:
-            if node in self._settings:
-                return  # asked twice, and answered twice
+            if self._unknown.get(node) != record_name:
+                return  # asked twice, and answered twice, or started again meanwhile
+            del self._unknown[node]
             self._settings[node] = {
                 name: parameter_value_to_python(value)
                 for name, value in zip(names, answer.result().values, strict=True)
                 if value.type != ParameterType.PARAMETER_NOT_SET
             }
-            self._while_disk_lasts(self._put_on_record)(node, self._settings[node])
+            self._while_disk_lasts(self._put_on_record)(node, record_name, self._settings[node])
 
         client.list_parameters(callback=on_list)
 
-    def _put_on_record(self, node: str, values: dict[str, Any]) -> None:
+    def _put_on_record(self, node: str, record_name: str, values: dict[str, Any]) -> None:
         """Write parameters at once, so that a bag that is cut short can be flown again."""
         here = ("bag",) if node == self.get_fully_qualified_name() else ()  # where, not how, it was recorded
         recorded = {name: json.dumps(value) for name, value in values.items() if name not in here}
-        self.bag.add_metadata(f"parameters {node}", recorded)
-        if node == "/plant":
+        self.bag.add_metadata(record_name, recorded)
+        if record_name == parameters_record("/plant"):
             self.bag.add_metadata("run", {"scenario": self._scenario, "seed": str(values.get("seed", ""))})
             self.bag.add_attachment(LAYOUT, foxglove_layout(values.get("deputies", ())).encode())
 

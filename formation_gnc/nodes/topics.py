@@ -5,9 +5,6 @@ from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSProfile, QoSReli
 DEPTH = 2000
 """Messages that a writer keeps for who is late or slow, and that the recorder may lag behind."""
 
-PARTS = ("navigation", "guidance", "controller")
-"""Nodes of every deputy, in its namespace."""
-
 CLOCK = "/clock"
 TRUTH = "/truth"
 EVENTS = "/events"
@@ -25,6 +22,8 @@ STATUS = "status"
 SEPARATION = "separation"
 """Of a deputy in a fleet."""
 TIMING = "timing"
+PARTS = {"navigation": ESTIMATE, "guidance": TARGET, "controller": THRUST}
+"""Nodes of every deputy, in its namespace, and what each answers with."""
 DEPUTY_TOPICS = (MEASUREMENT, ESTIMATE, TARGET, THRUST, STATUS, TIMING)
 """Relative to the deputy's namespace."""
 

@@ -9,8 +9,15 @@ import formation_gnc
 
 LOST = "lost messages"
 """Name of the metadata record that says how many messages of each topic a recorder knows to have missed."""
-
 PACKAGES = ("numpy", "scipy", "numba", "filterpy", "osqp", "mcap")
+
+
+def parameters_record(node: str, start: int | None = None) -> str:
+    """Name of the metadata record with the parameters of a node, by its full name.
+
+    start: stamp (ns) of its first answer, when it had been started again.
+    """
+    return f"parameters {node}" if start is None else f"parameters {node} from {start}"
 
 
 def provenance() -> dict[str, dict[str, str]]:

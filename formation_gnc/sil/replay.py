@@ -3,7 +3,8 @@
 What flew is taken from the bag alone. Parameters are its metadata records `parameters NODE`; changes in
 flight are either scheduled there, or are the `/events` of kind `parameters` and are adopted again at their
 tick. A part is given an input only where it was given it in the recorded run, which its `timing` tells; one
-that had been started again, whose messages are numbered from 1 again, is here too.
+that had been started again, whose messages are numbered from 1 again, is here too, with the parameters that
+it was started with then, `parameters NODE from STAMP`.
 
 The truth is recorded, not flown: changed parts say what they would have commanded, and nothing answers them.
 """
@@ -18,11 +19,12 @@ from typing import Any
 from formation_gnc.control.autopilot import Autopilot, ControllerParameters
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.guidance.guide import GuidanceParameters, Guide
-from formation_gnc.interface import EstimateStatus, Event, Timing
+from formation_gnc.interface import NANOSECONDS, EstimateStatus, Event, Timing
 from formation_gnc.meeting import Meeting
 from formation_gnc.navigation.navigator import NavigationParameters, Navigator
 from formation_gnc.parameters import OWN_OF_ROS, dump, leaves, load, read_yaml
 from formation_gnc.part import Part, changes_told, text_of
+from formation_gnc.recording.provenance import parameters_record
 from formation_gnc.recording.reader import Bag
 from formation_gnc.sil.runner import Sink
 
@@ -55,23 +57,23 @@ class ReplayedPart:
 
     def __init__(self, node: str, values: Mapping[str, Any]) -> None:
         """Build it from its parameters; raises ConfigurationError for what cannot be flown."""
-        self.restarts: Collection[int] = ()
-        """Stamps with whose answers a process began that had been started again."""
+        self.restarts: dict[int, Any] = {}
+        """Parameters by the stamps with whose answers a process began that had been started again."""
         self.node = node
         self.kind = KINDS[node.rpartition("/")[2]]
-        self.parameters: Any = load(self.kind.schema, values)
         self.inputs = [_sibling(node, name) for name in self.kind.inputs]
-        deputy = node.rpartition("/")[0].strip("/")
-        fleet = getattr(self.parameters, "fleet", ())
-        self.others = [f"/{name}/estimate" for name in fleet if name != deputy]
-        """Inputs that may be missing."""
         self.orphans = 0
         """Ticks whose input the bag lacks though it was answered."""
         self._heard_last = True
-        self.start()
+        self.start(load(self.kind.schema, values))
 
-    def start(self) -> None:
-        """Begin anew, as a process that was just started."""
+    def start(self, parameters: Any) -> None:
+        """Begin anew, as a process that was just started with these parameters."""
+        self.parameters = parameters
+        deputy = self.node.rpartition("/")[0].strip("/")
+        fleet = getattr(parameters, "fleet", ())
+        self.others = [f"/{name}/estimate" for name in fleet if name != deputy]
+        """Inputs that may be missing."""
         self._part: Part[Any, Any] = self.kind.build(self.node, self.parameters)
         self._meeting = Meeting((*self.inputs, *self.others), len(self.inputs))
 
@@ -104,7 +106,7 @@ class ReplayedPart:
         """
         acquired = getattr(recorded, "status", None) == EstimateStatus.ACQUIRED
         if is_heard and (time in self.restarts or (acquired and not self._heard_last)):
-            self.start()
+            self.start(self.restarts.get(time, self.parameters))
         self._heard_last = is_heard
         return is_heard
 
@@ -113,9 +115,12 @@ class ReplayedPart:
         return {name: text if kinds[name] is str else read_yaml(text) for name, text in texts.items()}
 
 
-def parameters_of(bag: Bag, node: str) -> dict[str, Any]:
-    """Parameters that a node flew with at the start, as the bag has them; empty when it has none."""
-    recorded = bag.metadata.get(f"parameters {node}", {})
+def parameters_of(bag: Bag, node: str, start: int | None = None) -> dict[str, Any]:
+    """Parameters that a node was started with, as the bag has them; empty when it has none.
+
+    start: stamp (ns) of its first answer after it had been started again; none for its first start.
+    """
+    recorded = bag.metadata.get(parameters_record(node, start), {})
     return {name: json.loads(text) for name, text in recorded.items() if not name.startswith(OWN_OF_ROS)}
 
 
@@ -132,18 +137,21 @@ def nodes_of(bag: Bag, kinds: Collection[str]) -> list[str]:
     return [f"/{deputy}/{kind}" for kind in KINDS if kind in kinds for deputy in deputies]
 
 
-def replay(bag: Bag, parameters: Mapping[str, Mapping[str, Any]], read: Read, sink: Sink, copy: Copy) -> int:
+def replay(
+    bag: Bag, parameters: Mapping[str, Mapping[str, Any]], read: Read, sink: Sink, copy: Copy
+) -> list[str]:
     """Fly a bag's inputs through parts again, tick by tick.
 
     Args:
         bag: the recorded run.
-        parameters: of every node to fly again, by full name, in the order of `nodes_of`.
+        parameters: of every node to fly again, by full name, in the order of `nodes_of`. Those that are not
+            as recorded go before what is recorded at every start.
         read: makes records of messages.
         sink: takes topic and record of all that the parts say.
         copy: takes every other message as it was recorded, sorted by stamp.
 
     Returns:
-        How many answers are as recorded, not flown, since the bag lacks what they answer.
+        What could not be flown as it was, in words.
 
     Raises:
         ConfigurationError: parameters that cannot be flown, or a recorded change that these do not allow.
@@ -159,8 +167,20 @@ def replay(bag: Bag, parameters: Mapping[str, Mapping[str, Any]], read: Read, si
     outputs = {_sibling(part.node, output) for part in parts for output in part.kind.outputs}
     answers = {part.node: _sibling(part.node, part.kind.outputs[0]) for part in parts}
     restarts = bag.restarts(list(answers.values()))
+    remarks = []
     for part in parts:
-        part.restarts = restarts[answers[part.node]]
+        recorded, given, latest = parameters_of(bag, part.node), parameters[part.node], part.parameters
+        changes = {name: value for name, value in given.items() if value != recorded.get(name)}
+        for stamp in sorted(restarts[answers[part.node]]):
+            values = parameters_of(bag, part.node, stamp)
+            if values:
+                latest = load(part.kind.schema, values | changes)
+            else:
+                remarks.append(
+                    f"{part.node} was started again at {stamp / NANOSECONDS:g} s; the bag lacks with which "
+                    "parameters, so it flies with those before"
+                )
+            part.restarts[stamp] = latest
     tick: dict[str, list[bytes]] = {}
     time = None
     for stamp, topic, messages in bag.by_stamp(list(bag.topics)):
@@ -171,7 +191,10 @@ def replay(bag: Bag, parameters: Mapping[str, Mapping[str, Any]], read: Read, si
         tick[topic] = messages
     if time is not None:
         _fly_tick(bag, parts, outputs, time, tick, read, sink, copy)
-    return sum(part.orphans for part in parts)
+    orphans = sum(part.orphans for part in parts)
+    if orphans:
+        remarks.append(f"{orphans} answers as recorded, not flown: the bag lacks what they answer")
+    return remarks
 
 
 def _fly_tick(

@@ -62,7 +62,7 @@ def test_the_scenario_puts_four_on_four_places_with_one_change_each() -> None:
 
 @pytest.mark.sil
 def test_a_fleet_flies_the_same_bits_on_the_graph_composed_in_process_and_again(
-    sil: Callable[..., Sil], tmp_path: Path
+    sil: Callable[..., Sil], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     document = yaml.safe_load(find_scenario("tetrahedral").read_text())
     document["/**/guidance"]["ros__parameters"] |= {
@@ -96,6 +96,9 @@ def test_a_fleet_flies_the_same_bits_on_the_graph_composed_in_process_and_again(
     ]
     assert sorted(places) == ["0", "1", "2", "3"]
     assert graph.arrays("/deputy1/target")["others"].shape == (120, 18)
+    assert main(["replay", str(graph.path), "--bag", str(tmp_path / "again")]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "identical on every GNC topic"
+    assert Bag(tmp_path / "again").arrays("/events")["kind"].tolist().count("reconfiguration") == 4
 
 
 @pytest.mark.sil

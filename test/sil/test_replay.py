@@ -40,17 +40,22 @@ def test_an_unchanged_replay_of_a_graph_run_gives_the_recorded_bits(
     assert identical(recorded, again, gnc_topics(recorded)) == []
 
 
-def test_a_controller_and_a_guidance_started_again_in_flight_are_so_in_the_replay(
+def test_nodes_started_again_in_flight_with_other_parameters_are_so_in_the_replay(
     desk: Desk, capsys: pytest.CaptureFixture[str]
 ) -> None:
     bag = desk.directory / "bag"
     plant, terminals = desk.take_off()
-    for kind in ("controller", "guidance"):
+    otherwise = {
+        "controller": {"algorithm": "mpc"},
+        "guidance": {"leader_follower.separation": 120.0},
+        "navigation": {"radius_sigma": 50.0},
+    }
+    for kind, parameters in otherwise.items():
         time.sleep(2.0)
         before = plant.text.count("miss")
         terminals[kind].signal(signal.SIGKILL)
         wait_until(lambda before=before: plant.text.count("miss") > before, f"the plant to miss the {kind}")
-        desk.start(kind)
+        desk.start(kind, **parameters)
     assert plant.wait() == 0
     desk.land()
     recorded = Bag(bag)
@@ -58,8 +63,10 @@ def test_a_controller_and_a_guidance_started_again_in_flight_are_so_in_the_repla
     assert {topic: len(stamps) for topic, stamps in starts.items()} == {
         "/deputy1/thrust": 1,
         "/deputy1/target": 1,
-        "/deputy1/estimate": 0,
+        "/deputy1/estimate": 1,
     }
+    assert recorded.arrays("/deputy1/status")["algorithm"][[0, -1]].tolist() == ["lqr", "mpc"]
+    assert recorded.arrays("/deputy1/target")["relative_state"][[0, -1], 1].round().tolist() == [-100, -120]
     for topic in GNC_TOPICS:  # a node that comes back goes on: it does not answer what it is told of before
         assert np.all(np.diff(recorded.arrays(topic)["stamp_ns"]) > 0), topic
     assert main(["replay", str(bag), "--bag", str(desk.directory / "again")]) == 0
