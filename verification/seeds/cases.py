@@ -1,9 +1,11 @@
 """What Joshi's cases have in common: units, chiefs, desired trajectories and the flight through them."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
+import matplotlib as mpl
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +13,10 @@ from formation_gnc.guidance.relative_orbit import RelativeOrbit, RelativeOrbitPa
 from formation_gnc.relative.chief import KeplerChief
 from formation_gnc.relative.model import RelativeModel
 from formation_gnc.relative.nonlinear import NonlinearModel
+from verification.control import save
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
 
 Array = NDArray[np.float64]
 
@@ -98,3 +104,40 @@ def table(heading: Sequence[str], columns: Sequence[Array | Sequence[str]]) -> s
         ]
         lines.append(f"| {name} | " + " | ".join(words) + " |")
     return "\n".join(lines) + "\n"
+
+
+def picture(path: Path, what: str, flights: Mapping[str, tuple[Array, Array]], goals: Array) -> None:
+    """Trajectories, errors against the desired states (N + 1, 6), and thrust by axis, as in Joshi's figures.
+
+    Lines grow thinner from one flight to the next, so that those below show where they agree. Thrust is drawn
+    as far as half of the laws go.
+    """
+    plot = plt.figure(figsize=(13, 8))
+    space = plot.add_subplot(2, 3, 1, projection="3d", elev=30.0, azim=-150.0)
+    place, velocity, *axes = (plot.add_subplot(2, 3, k) for k in range(2, 7))
+    seconds = TICK * np.arange(len(goals))
+    widths = np.linspace(3.0, 1.2, len(flights))
+    for width, (name, (states, accelerations)) in zip(widths, flights.items(), strict=True):
+        error = states - goals
+        space.plot(*(states[:, :3] / KM).T, lw=width, label=name)
+        place.semilogy(seconds, np.linalg.norm(error[:, :3], axis=1), lw=width)
+        velocity.semilogy(seconds, np.linalg.norm(error[:, 3:], axis=1), lw=width)
+        for panel, along in zip(axes, accelerations.T, strict=True):
+            panel.plot(seconds[:-1], along, lw=width)
+    space.plot(*(goals[:, :3] / KM).T, "k:", lw=1.0, label="desired")
+    space.plot(*(goals[-1:, :3] / KM).T, "ko", ms=4, label="desired at the end")
+    space.set(xlabel="x, km", ylabel="y, km", zlabel="z, km", title=what)
+    place.set(xlabel="time, s", ylabel="position error, m", title="distance from $X_d(t)$")
+    velocity.set(xlabel="time, s", ylabel="velocity error, m/s", title="velocity against $X_d(t)$")
+    place.set_ylim(bottom=max(1e-3, place.get_ylim()[0]))
+    velocity.set_ylim(bottom=max(1e-6, velocity.get_ylim()[0]))
+    place.legend(*space.get_legend_handles_labels(), fontsize=8)
+    largest = np.array([np.abs(accelerations).max(axis=0) for _, accelerations in flights.values()])
+    for name, panel, peaks in zip("xyz", axes, largest.T, strict=True):
+        low, high = panel.get_ylim()
+        reach = 1.4 * float(np.median(peaks))
+        panel.set_ylim(max(low, -reach), min(high, reach))
+        panel.set(
+            xlabel="time, s", ylabel="m/s²", title=f"thrust along {name}, at most {peaks.max():.2g} m/s²"
+        )
+    save(plot, path)
