@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import matplotlib as mpl
+import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,10 +13,7 @@ from formation_gnc.guidance.relative_orbit import RelativeOrbit, RelativeOrbitPa
 from formation_gnc.relative.chief import KeplerChief
 from formation_gnc.relative.model import RelativeModel
 from formation_gnc.relative.nonlinear import NonlinearModel
-from verification.control import save
-
-mpl.use("Agg")
-import matplotlib.pyplot as plt
+from verification.figure import save
 
 Array = NDArray[np.float64]
 

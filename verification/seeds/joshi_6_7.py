@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import matplotlib as mpl
+import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
@@ -16,8 +16,7 @@ from formation_gnc.relative.chief import KeplerChief, frame_matrix
 from formation_gnc.relative.model import ON_THE_CHIEF, RelativeModel
 from formation_gnc.relative.nonlinear import NonlinearModel
 from formation_gnc.relative.oblate import OblateModel
-from verification.control import save
-from verification.figure import Figure
+from verification.figure import Figure, save
 from verification.seeds.accepted import Ours
 from verification.seeds.cases import (
     KM,
@@ -36,9 +35,6 @@ from verification.seeds.cases import (
 )
 from verification.seeds.joshi_4_5 import GAIN, HILL, goals_of, to_go
 from verification.seeds.over_optimum import least, orbit
-
-mpl.use("Agg")
-import matplotlib.pyplot as plt
 
 FINAL = 2000
 STEEP = math.radians(60.0)

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-import matplotlib as mpl
+import matplotlib.pyplot as plt
 import numpy as np
 
 from formation_gnc.control.networks import Networks, Regulator, functions
@@ -13,8 +13,7 @@ from formation_gnc.relative.chief import KeplerChief
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.model import NO_THRUST
 from formation_gnc.relative.oblate import OblateModel
-from verification.control import save
-from verification.figure import Figure
+from verification.figure import Figure, save
 from verification.seeds.accepted import Ours
 from verification.seeds.cases import (
     KM,
@@ -30,9 +29,6 @@ from verification.seeds.cases import (
     table,
 )
 from verification.seeds.joshi_4_5 import HILL, goals_of, sdre_thrust
-
-mpl.use("Agg")
-import matplotlib.pyplot as plt
 
 FINAL = 2000
 ACTUAL = 11114.51658 * KM

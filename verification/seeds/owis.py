@@ -7,19 +7,15 @@ from itertools import product
 from math import pi
 from pathlib import Path
 
-import matplotlib as mpl
+import matplotlib.pyplot as plt
 import numpy as np
 from numpy.linalg import LinAlgError
 from numpy.typing import NDArray
 from scipy.integrate import solve_bvp
 
 from formation_gnc.control.steering import Cost, Sequence, System, approximating_sequence
-from verification.control import save
-from verification.figure import Figure
+from verification.figure import Figure, save
 from verification.seeds.accepted import Ours
-
-mpl.use("Agg")
-import matplotlib.pyplot as plt
 
 Array = NDArray[np.float64]
 

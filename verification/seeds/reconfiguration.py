@@ -3,19 +3,15 @@
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
+import matplotlib.pyplot as plt
 import numpy as np
 
 from formation_gnc.control.finite_horizon import FiniteHorizonController
 from formation_gnc.control.registry import ALGORITHMS
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
-from verification.control import save
-from verification.figure import Figure
+from verification.figure import Figure, save
 from verification.seeds.accepted import Ours
-
-mpl.use("Agg")
-import matplotlib.pyplot as plt
 
 TICK, BEGIN, FINAL, END = 10.0, 4500.0, 4000.0, 10_500.0
 """s: ticks, when the target changes, the time for it, and when the flight is over."""
