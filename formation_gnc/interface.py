@@ -6,7 +6,6 @@ the message's stamp in nanoseconds of simulated time. The core speaks these, the
 
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,7 +94,8 @@ class Estimate:
     blind: str = ""
 
 
-class Neighbour(NamedTuple):
+@dataclass(slots=True)
+class Neighbour:
     """What a deputy needs to know of another one's estimate."""
 
     time: int

@@ -8,12 +8,10 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, TransformStamped
-from rclpy.serialization import deserialize_message
 from scipy.spatial.transform import Rotation
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
@@ -21,7 +19,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from formation_gnc.interface import NANOSECONDS, SatelliteTruth, Target, Truth, Vector
 from formation_gnc.mission import ANY_ORBIT, Mission, Orbit
 from formation_gnc.nodes import topics
-from formation_gnc.nodes.conversion import from_message, message_type
+from formation_gnc.nodes.conversion import from_cdr
 from formation_gnc.nodes.raw_topics import first_stamp
 from formation_gnc.nodes.shell import ConfiguredNode, run
 from formation_gnc.orbit.frames import hill_rotation
@@ -60,12 +58,8 @@ class DisplayNode(ConfiguredNode):
         self._targets: dict[str, bytes] = {}
         self._trails: dict[str, deque[Vector]] = {}
         self._trail_time = -1
-        self._listen(Truth, topics.TRUTH, self._on_truth)
+        self.listen(Truth, topics.TRUTH, self._on_truth)
         self.create_timer(1.0 / self.values.rate, self._draw)
-
-    def _listen(self, record: type, topic: str, hear: Callable[[bytes], object]) -> None:
-        quality = topics.quality(topics.LATEST)
-        self.create_subscription(message_type(record), topic, hear, quality, raw=True)
 
     def _teller(self) -> Callable[[list[TransformStamped]], object]:
         try:
@@ -85,7 +79,7 @@ class DisplayNode(ConfiguredNode):
         if time < self._trail_time or time - self._trail_time >= self.values.trail_step * NANOSECONDS:
             self._trail_time = time
             points = max(1, round(self.values.trail / self.values.trail_step))
-            for deputy in _read(Truth, data).deputies:
+            for deputy in from_cdr(Truth, data).deputies:
                 trail = self._trails.setdefault(deputy.name, deque(maxlen=points))
                 trail.append(deputy.relative_state[:3])
 
@@ -93,22 +87,18 @@ class DisplayNode(ConfiguredNode):
         """Publish the latest, if there is any."""
         if self._truth is None:
             return
-        truth, self._truth = _read(Truth, self._truth), None
+        truth, self._truth = from_cdr(Truth, self._truth), None
         for deputy in truth.deputies:
             if deputy.name not in self._targets:
                 self._targets[deputy.name] = b""
                 keep = partial(self._targets.__setitem__, deputy.name)
-                self._listen(Target, f"/{deputy.name}/{topics.TARGET}", keep)
-        targets = {name: _read(Target, data) for name, data in self._targets.items() if data}
+                self.listen(Target, f"/{deputy.name}/{topics.TARGET}", keep)
+        targets = {name: from_cdr(Target, data) for name, data in self._targets.items() if data}
         size = self.values.size or max(
             1.0, max(float(np.linalg.norm(each.relative_state[:3])) for each in truth.deputies) / 40.0
         )
         self._tell_transforms(list(transforms(truth)))
         self._markers.publish(MarkerArray(markers=list(markers(truth, targets, self._trails, size))))
-
-
-def _read(record: Any, data: bytes) -> Any:
-    return from_message(record, deserialize_message(data, message_type(record)))
 
 
 def transforms(truth: Truth) -> Iterator[TransformStamped]:

@@ -1,17 +1,16 @@
 """The plant node: owns time, and lets a tick pass when every deputy has answered."""
 
 from collections.abc import Iterator
+from functools import partial
 from time import monotonic
-from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from formation_gnc_msgs.msg import Thrust as ThrustMessage
 from rclpy._rclpy_pybind11 import NodeNameNonExistentError
 from rosgraph_msgs.msg import Clock
 
 from formation_gnc.interface import NANOSECONDS, Event, Measurement, Thrust, Truth, Vector
 from formation_gnc.nodes import topics
-from formation_gnc.nodes.conversion import from_message
+from formation_gnc.nodes.conversion import from_cdr
 from formation_gnc.nodes.shell import ConfiguredNode, asked_to_stop, run
 from formation_gnc.plant.plant import Plant, PlantParameters
 
@@ -49,12 +48,7 @@ class PlantNode(ConfiguredNode):
         self._tell_time = self.create_publisher(Clock, topics.CLOCK, topics.quality())
         self._diagnostics = self.create_publisher(DiagnosticArray, topics.DIAGNOSTICS, topics.quality())
         for name in self.values.deputies:
-            self.create_subscription(
-                ThrustMessage,
-                f"/{name}/{topics.THRUST}",
-                lambda message, name=name: self._on_thrust(name, message),
-                topics.quality(topics.LATEST),
-            )
+            self.listen(Thrust, f"/{name}/{topics.THRUST}", partial(self._on_thrust, name))
         self.create_subscription(Clock, topics.RECORDED, self._on_recorded, topics.quality(topics.LATEST))
         self._forces: dict[str, Vector] = {}
         self._awaited: set[str] = set()
@@ -109,8 +103,8 @@ class PlantNode(ConfiguredNode):
         ):
             self._advance()
 
-    def _on_thrust(self, name: str, message: Any) -> None:
-        thrust = from_message(Thrust, message)
+    def _on_thrust(self, name: str, data: bytes) -> None:
+        thrust = from_cdr(Thrust, data)
         if name not in self._awaited or thrust.time != self.plant.time:
             return
         self._awaited.discard(name)

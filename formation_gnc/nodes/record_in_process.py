@@ -3,15 +3,14 @@
 from collections.abc import Callable
 from typing import Any
 
-from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 
 from formation_gnc import interface
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.interface import NANOSECONDS
 from formation_gnc.nodes import topics
-from formation_gnc.nodes.conversion import from_message, message_type, to_message
-from formation_gnc.recording.decode import installed_type
+from formation_gnc.nodes.conversion import from_cdr, message_type, to_cdr
 from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.writer import BagWriter, TopicDefinition
 
@@ -23,16 +22,14 @@ class InProcessRecorder:
         """Write to a bag, which is closed by the one who made it."""
         self._bag = bag
         self._counts: dict[str, int] = {}
-        self._canonical: dict[str, Callable[[bytes], bytes]] = {}
 
     def __call__(self, topic: str, record: Any) -> None:
         """Write one record; the clock follows each truth, as the plant publishes it."""
-        kind: Any = type(record)
-        self._write(topic, to_message(record), message_type(kind), record.time)
+        self._write(topic, message_type(type(record)), to_cdr(record), record.time)
         if isinstance(record, interface.Truth):
             clock = Clock()
             clock.clock.sec, clock.clock.nanosec = divmod(record.time, NANOSECONDS)
-            self._write(topics.CLOCK, clock, Clock, record.time)
+            self._write(topics.CLOCK, Clock, serialize_message(clock), record.time)
 
     def copy(self, source: Bag, topic: str, data: bytes, time: int) -> None:
         """Write a message of another bag as it is."""
@@ -47,16 +44,11 @@ class InProcessRecorder:
         self._counts[topic] += 1
         self._bag.write(topic, data, time, self._counts[topic])
 
-    def _write(self, topic: str, message: Any, kind: Any, time: int) -> None:
-        if topic not in self._canonical:
-            type_name = f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}"
-            if topic not in self._counts:
-                self._bag.add_topic(topic, type_name, topics.DEPTH)
-                self._counts[topic] = 0
-            self._canonical[topic] = installed_type(type_name).canonical
+    def _write(self, topic: str, kind: Any, data: bytes, time: int) -> None:
+        if topic not in self._counts:
+            self._bag.add_topic(topic, f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}", topics.DEPTH)
+            self._counts[topic] = 0
         self._counts[topic] += 1
-        # serialize_message leaves what was in memory in the gaps between fields; DDS does not
-        data = self._canonical[topic](serialize_message(message))
         self._bag.write(topic, data, time, self._counts[topic])
 
 
@@ -76,6 +68,6 @@ def reader(bag: Bag) -> Callable[[str, bytes], Any]:
             record = records[topic] = getattr(interface, kind.rpartition("/")[2], None)
             if record is None:
                 raise ConfigurationError(f"{bag.path}: topic {topic} has messages of type {kind}")
-        return from_message(record, deserialize_message(data, message_type(record)))
+        return from_cdr(record, data)
 
     return read

@@ -2,18 +2,19 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from time import monotonic
 from typing import Any
 
-from formation_gnc_msgs.msg import Thrust as ThrustMessage
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import SetBool, Trigger
 
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.interface import NANOSECONDS
+from formation_gnc.interface import NANOSECONDS, Thrust
 from formation_gnc.mission import ANY_ORBIT, Mission, Orbit
 from formation_gnc.nodes import topics
-from formation_gnc.nodes.conversion import message_class, stamp
+from formation_gnc.nodes.conversion import message_class
+from formation_gnc.nodes.raw_topics import first_stamp
 from formation_gnc.nodes.shell import ConfiguredNode, asked_to_stop, run
 from formation_gnc.parameters import parameter
 from formation_gnc.recording.reader import Bag
@@ -74,12 +75,7 @@ class ReplayNode(ConfiguredNode):
             name.replace(topics.MEASUREMENT, topics.THRUST) for name in names if name in measured
         } & self.bag.topics.keys() - self._played.keys()
         for name in sorted(self._answers):
-            self.create_subscription(
-                ThrustMessage,
-                name,
-                lambda message, name=name: self._on_thrust(name, message),
-                topics.quality(topics.LATEST),
-            )
+            self.listen(Thrust, name, partial(self._on_thrust, name))
         self.create_service(SetBool, "~/pause", self._on_pause)
         self.create_service(Trigger, "~/step", self._on_step)
         self.done = False
@@ -156,8 +152,8 @@ class ReplayNode(ConfiguredNode):
         clock.clock.sec, clock.clock.nanosec = divmod(self._time, NANOSECONDS)
         self._tell_time.publish(clock)
 
-    def _on_thrust(self, topic: str, message: Any) -> None:
-        if stamp(message) == self._time:
+    def _on_thrust(self, topic: str, data: bytes) -> None:
+        if first_stamp(data) == self._time:
             self._awaited.discard(topic)
             self.check()
 

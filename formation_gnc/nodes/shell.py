@@ -29,10 +29,10 @@ except ImportError:  # other builds of Jazzy do not have it; theirs is slower an
     EventsExecutor = SingleThreadedExecutor
 
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.interface import Estimate, Event, Timing
+from formation_gnc.interface import Event, Neighbour, Timing
 from formation_gnc.meeting import Meeting
 from formation_gnc.nodes import topics
-from formation_gnc.nodes.conversion import blank, from_message, message_type, neighbour, to_message
+from formation_gnc.nodes.conversion import from_cdr, message_type, to_cdr
 from formation_gnc.nodes.wires import Wires
 from formation_gnc.orbit.propagation import ImpactError
 from formation_gnc.parameters import OWN_OF_ROS, Leaf, dump, leaves, load, read_yaml
@@ -98,8 +98,12 @@ class ConfiguredNode(Node):  # type: ignore[misc]
     def speak(self, record: type, topic: str) -> Callable[[Any], None]:
         """A function that publishes a record on a topic."""
         publisher = self.create_publisher(message_type(record), topic, topics.quality())
-        message = blank(record)
-        return lambda each: publisher.publish(to_message(each, message))
+        return lambda each: publisher.publish(to_cdr(each))
+
+    def listen(self, record: type, topic: str, hear: Callable[[bytes], object]) -> None:
+        """Let `hear` have the latest message of a record on a topic, as it came."""
+        quality = topics.quality(topics.LATEST)
+        self.create_subscription(message_type(record), topic, hear, quality, raw=True)
 
     def spin(
         self,
@@ -235,17 +239,13 @@ class PartNode[P: Part[Any, Any]](ConfiguredNode):
             for each in latest.values():
                 each()
 
-        def listen(topic: str, record: type, read: Callable[[Any], Any], raw: bool) -> None:
-            hear, quality = partial(arrive, topic, read), topics.quality(topics.LATEST)
-            self.create_subscription(message_type(record), topic, hear, quality, raw=raw)
-
         for topic, record in inputs.items():
             if topic in self._wires:
                 self._wires.hear(topic, partial(take, topic, lambda each: each))
             else:
-                listen(topic, record, partial(from_message, record), raw=False)
+                self.listen(record, topic, partial(arrive, topic, partial(from_cdr, record)))
         for topic in others:
-            listen(topic, Estimate, neighbour, raw=True)
+            self.listen(Neighbour, topic, partial(arrive, topic, partial(from_cdr, Neighbour)))
 
     def _finish_tick(self, time: int, spent: float) -> None:
         """Publish what nobody waits for: the events, and the wall time (s) that the answer took."""

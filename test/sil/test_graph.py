@@ -250,16 +250,24 @@ def test_two_runs_at_once_do_not_hear_each_other(sil: StartSil, tmp_path: Path) 
         assert {Bag(run.bag).topics[topic].count for topic in GNC_TOPICS} == {300}
 
 
+def slowness() -> float:
+    """How many times longer than alone a process takes now, for what else the machine does."""
+    began = time.monotonic(), time.process_time()
+    while time.process_time() - began[1] < 0.1:
+        pass
+    return (time.monotonic() - began[0]) / (time.process_time() - began[1])
+
+
 def test_interrupt_stops_everything_within_three_seconds_and_closes_the_bag(sil: StartSil) -> None:
     run = sil("--real-time-factor", "200")
     run.wait_for_flight()
     children = run.children()
     assert set(children) == {"plant", "recorder", *PARTS}
+    slow_before = slowness()
     interrupted = time.monotonic()
     os.killpg(run.process.pid, signal.SIGINT)
     status, _, errors = run.finish()
-    # 3 s are asked for; a machine that runs five processes on one core may take a little longer to reap them
-    assert time.monotonic() - interrupted < 4.0
+    assert time.monotonic() - interrupted < 3.0 * max(slow_before, slowness())
     assert status == 130
     assert errors.strip().splitlines()[-1] == f"formation-gnc: interrupted; bag closed: {run.bag}"
     assert not any(Path(f"/proc/{pid}").exists() for pid in children.values())

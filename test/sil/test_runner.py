@@ -7,18 +7,15 @@ done when a change is meant to change the flight, and the new trace to be looked
 import csv
 import math
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from rclpy.serialization import serialize_message
 
 from formation_gnc.interface import NANOSECONDS
-from formation_gnc.nodes.conversion import to_message
-from formation_gnc.recording.decode import MessageType, installed_type
+from formation_gnc.nodes.conversion import to_cdr
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
 
@@ -54,18 +51,8 @@ def fly(overrides: Overrides | None = None, ticks: int | None = None) -> tuple[R
     return run, records
 
 
-@cache
-def message_type(name: str) -> MessageType:
-    return installed_type(f"formation_gnc_msgs/msg/{name}")
-
-
-def bits(record: Any) -> bytes:
-    """What DDS would carry of a record, but for the gaps that it leaves as they happen to be."""
-    return message_type(type(record).__name__).canonical(serialize_message(to_message(record)))
-
-
 def all_bits(records: Records) -> dict[str, list[bytes]]:
-    return {topic: [bits(each) for each in of] for topic, of in records.items()}
+    return {topic: [to_cdr(each) for each in of] for topic, of in records.items()}
 
 
 @pytest.fixture(scope="module")
@@ -210,8 +197,8 @@ def test_another_seed_gives_other_noise_on_the_same_start() -> None:
 def test_records_do_not_change_after_they_were_handed_over() -> None:
     run, kept = Run(load_scenario("leader_follower")), []
     for _ in range(30):
-        run.tick(lambda _, record: kept.append((record, bits(record))))
-    assert all(bits(record) == before for record, before in kept)
+        run.tick(lambda _, record: kept.append((record, to_cdr(record))))
+    assert all(to_cdr(record) == before for record, before in kept)
 
 
 def test_another_deputy_changes_nothing_for_the_first() -> None:
