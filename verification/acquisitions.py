@@ -322,16 +322,17 @@ DIFFERENCES = (
 )
 
 CONCLUSION = """
-Error is the largest in an orbit. Delta-v is the sum over the axes; the least is what no
-law can do without from that start to that target through these nights, on Hill's equations (a linear
-programme): none where 8 uN are not enough.
+Error is the largest in an orbit. Delta-v is the sum over the axes; the least is what no law can do
+without from that start to that target through these nights, on Hill's equations (a linear programme):
+none where 8 uN are not enough.
 
-No thrust meets an eclipse that comes as foreseen; that steps are dark as a whole takes {lost:.0f} % of the orbit besides the
-night. The printed weight leaves hundreds of metres after 100 orbits, and with steps of 80 s, of which
-three times as many are to be paid for, it hardly moves at all. Ten times the weight brings all home whose
-places can be reached; that of the fourth satellite on the way to equidistant cannot, by any law. With
-order and phase shared out all arrive, and spend less. What MPC spends over the least it pays for being
-early, since the least takes all of the time, and for a cost that is quadratic in thrust.
+No thrust meets an eclipse that comes as foreseen; that steps are dark as a whole takes {lost:.0f} % of
+the orbit besides the night. The printed weight leaves hundreds of metres after 100 orbits, and with steps
+of 80 s, of which three times as many are to be paid for, it hardly moves at all. Ten times the weight
+brings all home whose places can be reached; that of the fourth satellite on the way to equidistant
+cannot, by any law. With order and phase shared out all arrive, and spend less. What MPC spends over the
+least it pays for being early, since the least takes all of the time, and for a cost that is quadratic in
+thrust.
 
 On the truth of two orbits about a point mass some metres remain of what Hill's equations leave out, and
 under J2 tens. A formation of a kilometre is pulled apart by metres in an orbit then, which neither its target
@@ -375,7 +376,7 @@ def kremmydas(directory: Path) -> tuple[str, list[Figure]]:
             0.0,
             0.0,
         ),
-        # Guidance foresees eclipses under J2, an orbit or two ahead; about a point mass they come some 3 s off.
+        # Guidance foresees eclipses under J2, an orbit ahead or two; about a point mass they are some 3 s off.
         # With two edges in an orbit of 74 steps of 80 s that is 0.1 % of the steps.
         Figure(
             "two-body truth: steps with force that meet an eclipse",
