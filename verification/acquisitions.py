@@ -376,7 +376,7 @@ def kremmydas(directory: Path) -> tuple[str, list[Figure]]:
             0.0,
             0.0,
         ),
-        # Guidance foresees eclipses under J2, an orbit ahead or two; about a point mass they are some 3 s off.
+        # Guidance foresees eclipses under J2, an orbit ahead or two; about a point mass some 3 s off.
         # With two edges in an orbit of 74 steps of 80 s that is 0.1 % of the steps.
         Figure(
             "two-body truth: steps with force that meet an eclipse",
