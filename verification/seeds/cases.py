@@ -123,7 +123,9 @@ def picture(path: Path, what: str, flights: Mapping[str, tuple[Array, Array]], g
             panel.plot(seconds[:-1], along, lw=width)
     space.plot(*(goals[:, :3] / KM).T, "k:", lw=1.0, label="desired")
     space.plot(*(goals[-1:, :3] / KM).T, "ko", ms=4, label="desired at the end")
-    space.set(xlabel="x, km", ylabel="y, km", zlabel="z, km", title=what)
+    space.set(xlabel="x, km", ylabel="y, km", title=what)
+    space.zaxis.set_rotate_label(False)  # it would stand on its head
+    space.set_zlabel("z, km", rotation=90.0)
     place.set(xlabel="time, s", ylabel="position error, m", title="distance from $X_d(t)$")
     velocity.set(xlabel="time, s", ylabel="velocity error, m/s", title="velocity against $X_d(t)$")
     place.set_ylim(bottom=max(1e-3, place.get_ylim()[0]))
