@@ -127,9 +127,9 @@ status names it; median compute time of the controller. Of several deputies the 
 the sum of delta-v. Tolerances are about `verification/laws.csv`: 2 % and 5 mm, 0.05 mm/s, 0.01 mN, 0.1 %;
 five times the compute time.
 
-{", ".join(FINITE_HORIZONS)} have flown to their target within the first half
-of each flight. After `final_time` LQR on Hill's equations holds it, which is no fallback: their errors at the
-end and over the last third are those of the holding LQR; delta-v and force are of both.
+{", ".join(FINITE_HORIZONS)} have flown to their target before the last
+third of each flight. After `final_time` LQR on Hill's equations holds it, which is no fallback: their errors
+at the end and over the last third are those of the holding LQR; delta-v and force are of both.
 """
 
 HEAD = (
