@@ -116,8 +116,10 @@ class Numbers(Kind):
     def read(self, values: Iterator[Any]) -> Any:
         if self.number is None:
             next(values)
-        array = np.frombuffer(next(values), self.dtype)
-        return array.tolist() if self.shape is None else array.reshape(self.shape).copy()
+        array = np.frombuffer(bytearray(next(values)), self.dtype)  # to be written to, as any array
+        if self.shape is None:
+            return array.tolist()
+        return array if len(self.shape) == 1 else array.reshape(self.shape)
 
 
 class Text(Kind):
