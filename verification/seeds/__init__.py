@@ -23,7 +23,6 @@ processor's arithmetic (OpenBLAS's kernels for Nehalem, NumPy without vector ins
 x86-64) uses up less than a hundredth of these; an identification time of the networks of 20.5 s instead of 20
 takes 27 of the 90 figures of Table 8.2 out of theirs. A figure that is off stands below its table, and the
 command fails. The tables of *figure, printed, ours* hold what the text claims, with the claim as tolerance.
-*Effort over the optimum* states its own.
 """
 
 Section = Callable[[Path], tuple[str, list[Figure]]]
