@@ -129,10 +129,15 @@ class Part[P: Schedulable, D](ABC):
         """Let a change take over that is due at this tick: first a scheduled one, then an adopted one.
 
         Time that runs backwards is a new run: what the schedule has changed is as it was at the start, what
-        was adopted stays.
+        was adopted stays, unless the schedule does not go with it from the start.
         """
         if time < self._time:
-            self._start()
+            try:
+                self._start()
+            except ConfigurationError as refusal:
+                self._changes.clear()
+                self._start()
+                self.record(time, "refused", str(refusal))
         self._time = time
         while self.foreseen and self.foreseen[0][0] <= time:
             (_, due), *later = self.foreseen

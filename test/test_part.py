@@ -240,6 +240,17 @@ def test_a_new_run_keeps_what_was_adopted_in_the_one_before() -> None:
     assert part.tick(2) == 3.0
 
 
+def test_a_new_run_drops_what_was_adopted_where_its_schedule_does_not_go_with_that() -> None:
+    part = Amplifier(("{at: 2, gain: 6}",))
+    assert part.tick(3) == 6.0
+    part.adopt(part.prepare({"gain": 1.0, "lag": 4.0}))
+    assert part.tick(4) == 1.0
+    part.take_events()
+    assert [part.tick(second) for second in (0, 2)] == [1.0, 6.0]
+    assert part.parameters.lag == 1.0
+    assert part.told()[0] == (0, "refused", "gain 6 is too much at lag 4")
+
+
 def test_the_same_tick_again_changes_nothing() -> None:
     part = Amplifier(("{at: 2, gain: 3}",))
     assert [part.tick(2), part.tick(2)] == [3.0, 3.0]

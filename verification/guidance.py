@@ -12,6 +12,7 @@ import matplotlib as mpl
 import numpy as np
 from numpy.typing import NDArray
 
+from bench import fleet as bench
 from formation_gnc.analysis.compare import gnc_topics
 from formation_gnc.analysis.flown import Flown
 from formation_gnc.analysis.metrics import figures as figures_of
@@ -277,11 +278,40 @@ def of_fleet(graph: Bag, process: Bag) -> tuple[str, list[Figure]]:
     return "\n".join(lines), figures
 
 
+def eight(_: Path) -> tuple[str, list[Figure]]:
+    """Eight satellites on the node graph beside one: what a tick takes, and of whom."""
+    lines = [
+        "## Eight satellites on two cores",
+        "",
+        f"`python -m bench fleet`: {bench.SCENARIO} on the node graph, a process for each satellite,",
+        f"all on {bench.CORES} cores, no recorder; means of {bench.ROUNDS} flights of some seconds. Work:",
+        "processor time a tick. Cores: how many were busy, work times ticks/s; what is missing was waited",
+        "for, or taken by others on the machine. Alone: work of plant and satellites without a graph, in",
+        "one process.",
+        "",
+        "| satellites | ticks/s | of all | plant, ms | a satellite, ms | all work, ms | cores | alone, ms |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    flown = bench.flights()
+    for name, each in flown.items():
+        lines.append(
+            f"| {name} | {each.speed:.0f} | {each.deputies * each.speed:.0f} | {1e3 * each.plant:.2f} | "
+            f"{1e3 * each.satellites / each.deputies:.2f} | {1e3 * each.work:.2f} | {each.cores:.2f} | "
+            f"{1e3 * each.arithmetic:.2f} |"
+        )
+    figures = [
+        Figure(f"ticks missed, {name}", "(required)", each.misses, "", 0.0, 0.0)
+        for name, each in flown.items()
+    ]
+    lines += ["", TABLE, *(figure.row for figure in figures), ""]
+    return "\n".join(lines), figures
+
+
 def main(directory: Path) -> int:
     """Write the page and its plots; return how many figures are outside their tolerance."""
     directory.mkdir(parents=True, exist_ok=True)
     sections, figures = [], []
-    for part in (drifts, assignments, fleet):
+    for part in (drifts, assignments, fleet, eight):
         text, limits = part(directory)
         sections.append(text)
         figures += limits
