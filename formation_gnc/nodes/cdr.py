@@ -93,14 +93,13 @@ class Number(Kind):
 class Numbers(Kind):
     """`number` numbers of a kind, any if that is None; a list, or an array if there is a `shape`."""
 
-    code: str
     dtype: np.dtype[Any]
     number: int | None
     shape: tuple[int, ...] | None
 
     @override
     def draw(self, pen: Pen) -> None:
-        pen.put(self.code, pen.count() if self.number is None else self.number)
+        pen.put(self.dtype.char, pen.count() if self.number is None else self.number)
 
     @override
     def write(self, value: Any, values: list[Any], counts: list[int]) -> None:

@@ -157,5 +157,5 @@ def _kind(slot: Any, hint: Any, shape: tuple[int, ...] | None) -> cdr.Kind:
         return cdr.Records(_codec(item))
     number = slot.size if isinstance(slot, Array) else None
     is_list = get_origin(hint) is list
-    code = _CODES[slot.value_type.typename]
-    return cdr.Numbers(code, np.dtype(code), number, None if is_list else shape or (-1,))
+    dtype = np.dtype(_CODES[slot.value_type.typename])
+    return cdr.Numbers(dtype, number, None if is_list else shape or (-1,))
