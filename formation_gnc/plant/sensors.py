@@ -1,7 +1,8 @@
 """What a deputy's sensors read of the truth."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from math import atan2, hypot, sqrt
+from math import atan2, gcd, hypot, sqrt
 
 import numpy as np
 
@@ -9,6 +10,9 @@ from formation_gnc.errors import ConfigurationError
 from formation_gnc.interface import NANOSECONDS, Sensor, Vector
 from formation_gnc.parameters import parameter
 from formation_gnc.randomness import generator
+
+DRAWN_AHEAD = 16
+"""Readings whose random numbers are drawn at a time: a draw on its own, amid other work, costs a multiple."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +66,8 @@ def read(sensor: Sensor, state: Vector, chief: Vector) -> float:
         state: inertial state of the satellite, (6,), m and m/s.
         chief: the same of the chief, which only its range depends on.
     """
-    x, y, z, vx, vy, vz = map(float, state)
+    numbers: list[float] = state.tolist()
+    x, y, z, vx, vy, vz = numbers
     if sensor is Sensor.RADIUS:
         return sqrt(x * x + y * y + z * z)
     if sensor is Sensor.RANGE_RATE:
@@ -71,7 +76,7 @@ def read(sensor: Sensor, state: Vector, chief: Vector) -> float:
         return atan2(z, hypot(x, y))
     if sensor is Sensor.RIGHT_ASCENSION:
         return atan2(y, x)
-    cx, cy, cz = map(float, chief[:3])
+    cx, cy, cz = chief[:3].tolist()
     return hypot(x - cx, y - cy, z - cz)
 
 
@@ -87,30 +92,31 @@ class _Instrument:
             raise ConfigurationError(
                 f"parameter {name}.interval: {model.interval!r} s is not allowed; it must be a tick or more"
             )
-        self._random = generator(seed, f"{deputy}/sensors/{sensor.name.lower()}")
+        self._draws = _draws(generator(seed, f"{deputy}/sensors/{sensor.name.lower()}"))
         self.age = self._late * tick_ns / NANOSECONDS
+        self.beat = gcd(self._every, self._late)
         self._under_way: list[tuple[int, float]] = []
 
-    def observe(self, tick: int, state: Vector, chief: Vector, outage: bool) -> None:
-        """Take the reading that is due at a tick."""
-        if tick % self._every:
-            return
-        model = self._model
-        # Always drawn, so that an error switched on leaves the others as they were.
-        noise = self._random.standard_normal()
-        dropped, stray, side = self._random.random(3).tolist()
-        if dropped < model.dropout or outage:
-            return
-        if stray < model.outlier:
-            noise += model.outlier_size if side < 0.5 else -model.outlier_size
-        value = read(self.sensor, state, chief) + model.bias + model.sigma * noise
-        self._under_way.append((tick + self._late, value))
-
-    def delivered(self, tick: int) -> float | None:
-        """The reading that arrives at a tick, if one does."""
+    def read(self, tick: int, state: Vector, chief: Vector, outage: bool) -> float | None:
+        """Take the reading that is due at a tick; returns the one that arrives at it, if one does."""
+        if tick % self._every == 0:
+            model = self._model
+            # Always drawn, so that an error switched on leaves the others as they were.
+            noise, (dropped, stray, side) = next(self._draws)
+            if dropped >= model.dropout and not outage:
+                if stray < model.outlier:
+                    noise += model.outlier_size if side < 0.5 else -model.outlier_size
+                value = read(self.sensor, state, chief) + model.bias + model.sigma * noise
+                self._under_way.append((tick + self._late, value))
         if self._under_way and self._under_way[0][0] == tick:
             return self._under_way.pop(0)[1]
         return None
+
+
+def _draws(random: np.random.Generator) -> Iterator[tuple[float, list[float]]]:
+    """For reading after reading: its noise, and three numbers that decide on dropout and outlier."""
+    while True:
+        yield from [(random.standard_normal(), random.random(3).tolist()) for _ in range(DRAWN_AHEAD)]
 
 
 class Sensors:
@@ -132,6 +138,8 @@ class Sensors:
         self._instruments = [
             _Instrument(sensor, model, tick_ns, seed, deputy) for sensor, model in suite if model.on
         ]
+        self._beat = gcd(*(instrument.beat for instrument in self._instruments))
+        """Ticks between which nothing is read and nothing arrives; 0 when no sensor is on."""
         self._fixes = generator(seed, f"{deputy}/fixes")
         self._fix_sigma = np.repeat([parameters.fix_position_sigma, parameters.fix_velocity_sigma], 3)
         self._outage = (parameters.outage_start, parameters.outage_start + parameters.outage_duration)
@@ -148,10 +156,11 @@ class Sensors:
         sensors: list[int] = []
         readings: list[float] = []
         ages: list[float] = []
+        if not self._instruments or tick % self._beat:
+            return sensors, readings, ages
         outage = self._outage[0] <= tick * self._tick_ns / NANOSECONDS < self._outage[1]
         for instrument in self._instruments:
-            instrument.observe(tick, state, chief, outage)
-            value = instrument.delivered(tick)
+            value = instrument.read(tick, state, chief, outage)
             if value is not None:
                 sensors.append(int(instrument.sensor))
                 readings.append(value)
