@@ -3,7 +3,7 @@
 Fixed steps of order eight: the same input gives the same bits, and the end of a tick is met exactly.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import inf, isfinite
 
 import numpy as np
@@ -14,6 +14,7 @@ from formation_gnc.errors import ConfigurationError
 from formation_gnc.orbit.constants import EARTH_RADIUS
 from formation_gnc.orbit.forces import SKY, Body, Forces, acceleration, look_up
 from formation_gnc.orbit.forces.radiation import illumination
+from formation_gnc.orbit.frames import inertial_acceleration
 from formation_gnc.orbit.gravity import oblate_acceleration, oblate_gradient
 from formation_gnc.orbit.jit import ANY_MATRIX, ANY_VECTOR, kernel
 from formation_gnc.orbit.runge_kutta import COUPLING, INSTANT_OF_STAGE, INSTANTS, STAGES, WEIGHTS
@@ -27,7 +28,12 @@ class ImpactError(RuntimeError):
     """A satellite has come down: its state lies below the Earth's surface, or is not a number."""
 
 
-@kernel((ANY_MATRIX, ANY_MATRIX, ANY_VECTOR, float64[:, ::1], int64[::1], float64, float64, int64))
+_TICK = (float64[:, ::1], ANY_MATRIX, ANY_VECTOR, float64[:, ::1], int64[::1], float64, float64, int64)
+"""What the kernels of a tick are given. They move the states on in place: to make Python an array of the
+result costs more than all else of the call."""
+
+
+@kernel(_TICK)
 def _advance(
     states: Array,
     thrust: Array,
@@ -37,13 +43,11 @@ def _advance(
     time: float,
     tick: float,
     substeps: int,
-) -> tuple[Array, int]:
-    """States after a tick, and the first satellite that is no longer above the surface, or -1."""
+) -> int:
+    """Move states on by a tick; returns the first satellite that is no longer above the surface, or -1."""
     step = tick / substeps
     coupling, weights = COUPLING.copy(), WEIGHTS.copy()  # constants would be unrolled: seconds to compile
     satellites = states.shape[0]
-    now = np.empty((satellites, 6))
-    now[:, :] = states
     sky = np.zeros((len(INSTANTS), SKY))
     rates = np.empty((STAGES, 6))
     stage = np.empty(6)
@@ -60,7 +64,7 @@ def _advance(
                     change = 0.0
                     for j in range(i):
                         change += coupling[i, j] * rates[j, c]
-                    stage[c] = now[satellite, c] + step * change
+                    stage[c] = states[satellite, c] + step * change
                 x, y, z, vx, vy, vz = stage
                 ax, ay, az = acceleration(
                     on, sky[INSTANT_OF_STAGE[i]], drag_area, light_area, x, y, z, vx, vy, vz
@@ -73,12 +77,28 @@ def _advance(
                 change = 0.0
                 for i in range(STAGES):
                     change += weights[i] * rates[i, c]
-                now[satellite, c] += step * change
+                states[satellite, c] += step * change
     for satellite in range(satellites):
-        x, y, z = now[satellite, 0], now[satellite, 1], now[satellite, 2]
+        x, y, z = states[satellite, 0], states[satellite, 1], states[satellite, 2]
         if not x * x + y * y + z * z >= EARTH_RADIUS * EARTH_RADIUS:
-            return now, satellite
-    return now, -1
+            return satellite
+    return -1
+
+
+@kernel(_TICK)
+def _fly(
+    states: Array,
+    forces: Array,
+    masses: Array,
+    areas: Array,
+    on: NDArray[np.int64],
+    time: float,
+    tick: float,
+    substeps: int,
+) -> int:
+    """`_advance` under forces along the Hill axes of the first."""
+    thrust = inertial_acceleration(states[0], forces, masses)
+    return _advance(states, thrust, masses, areas, on, time, tick, substeps)
 
 
 @kernel(float64(float64, ANY_VECTOR))
@@ -146,15 +166,29 @@ class Propagator:
         Raises:
             ImpactError: a satellite has come down.
         """
+        return self._after(_advance, time, states, accelerations, self._masses if masses is None else masses)
+
+    def fly(self, time: float, states: Array, forces: Array, masses: Array) -> Array:
+        """`advance` under forces along the Hill axes that the first satellite has at the start, (N, 3), N."""
+        return self._after(_fly, time, states, forces, masses)
+
+    def _after(
+        self,
+        move: Callable[..., int],
+        time: float,
+        states: Array,
+        thrust: Array,
+        masses: Array,
+    ) -> Array:
         if len(self._areas) not in (0, len(states)):
             raise ConfigurationError(
                 f"{len(self._areas)} bodies for {len(states)} satellites: each needs one"
             )
-        result: Array
-        result, fallen = _advance(
-            states,
-            accelerations,
-            self._masses if masses is None else masses,
+        result = states.copy()
+        fallen = move(
+            result,
+            thrust,
+            masses,
             self._areas,
             self._switches,
             self._epoch + time,
@@ -175,7 +209,7 @@ class Propagator:
             time: time since the epoch, s.
             position: inertial, (3,), m; a state will do.
         """
-        return float(_illumination(self._epoch + time, position))
+        return _illumination(self._epoch + time, position)
 
 
 @kernel((ANY_VECTOR, ANY_VECTOR, float64, int64))

@@ -7,6 +7,7 @@ from scipy.integrate import solve_ivp
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.orbit.constants import EARTH_RADIUS, J2, MU
 from formation_gnc.orbit.elements import Elements, state_from_elements
+from formation_gnc.orbit.frames import inertial_acceleration
 from formation_gnc.orbit.gravity import acceleration, gradient
 from formation_gnc.orbit.propagation import Propagator, advance_with_transition
 
@@ -94,6 +95,16 @@ def test_satellites_do_not_feel_one_another():
     for k in range(2):
         alone = propagator.advance(0.0, together[k : k + 1], thrust[k : k + 1])
         assert np.array_equal(alone[0], both[k])
+
+
+def test_forces_along_the_hill_axes_move_as_the_accelerations_that_they_are():
+    states = np.array([state_from_elements(LEO), state_from_elements(ECCENTRIC)])
+    forces, masses = np.array([[0.0, 0.0, 0.0], [0.01, -0.02, 0.03]]), np.array([100.0, 7.0])
+    propagator, before = Propagator(30.0), states.copy()
+    accelerations = inertial_acceleration(states[0], forces, masses)
+    moved = propagator.fly(0.0, states, forces, masses)
+    assert np.array_equal(moved, propagator.advance(0.0, states, accelerations, masses))
+    assert np.array_equal(states, before)
 
 
 def test_advance_leaves_its_arguments_alone_and_repeats_to_the_bit():
