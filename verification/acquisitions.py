@@ -20,7 +20,7 @@ from scipy.optimize import linprog
 
 from formation_gnc.guidance.guide import Guide
 from formation_gnc.mission import Mission
-from formation_gnc.orbit.frames import hill_rotation, inertial_from_relative, relative_from_inertial
+from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
 from formation_gnc.orbit.propagation import Propagator
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.sil.runner import Run
@@ -145,13 +145,12 @@ class HillTruth(Propagator):
         super().__init__(mission.tick, math.ceil(mission.tick / 10.0), epoch=mission.epoch)
         self._model = HillModel(mission.mean_motion)
 
-    def advance(self, time: float, states: Array, accelerations: Array, masses: Array | None = None) -> Array:
+    def fly(self, time: float, states: Array, forces: Array, masses: Array) -> Array:
         """States one tick later."""
-        chief = super().advance(time, states[:1], accelerations[:1])[0]
-        axes = hill_rotation(states[0])
+        chief = self.advance(time, states[:1], np.zeros((1, 3)))[0]
         moved = [
-            self._model.propagate(0.0, relative_from_inertial(states[0], state), self._tick, axes @ thrust)
-            for state, thrust in zip(states[1:], accelerations[1:], strict=True)
+            self._model.propagate(0.0, relative_from_inertial(states[0], state), self._tick, force / mass)
+            for state, force, mass in zip(states[1:], forces[1:], masses[1:], strict=True)
         ]
         return np.array([chief, *(inertial_from_relative(chief, each) for each in moved)])
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from formation_gnc.mission import LAST_SECOND, Mission
 from formation_gnc.orbit.elements import Elements, elements_from_state, state_from_elements
 from formation_gnc.orbit.forces import Body, Forces
 from formation_gnc.orbit.frames import (
-    inertial_acceleration,
     inertial_from_relative,
     relative_from_inertial,
     relative_to_first,
@@ -83,7 +83,7 @@ class PlantParameters(Mission):
                 f"parameter duration: {self.duration!r} s is not allowed; it must be a tick or more"
             )
 
-    @property
+    @cached_property
     def ticks(self) -> int:
         """Ticks to fly: those that begin within the duration."""
         return -(-round(self.duration * NANOSECONDS) // self.tick_ns)
@@ -120,7 +120,8 @@ class Plant:
     def __init__(self, parameters: PlantParameters) -> None:
         """Place chief and deputies; raises ConfigurationError for one that cannot fly."""
         self.parameters = parameters
-        self.tick = 0
+        self.tick, self.time = 0, 0
+        """Number and simulated time (ns) of the current tick."""
         self._events: list[Event] = []
         chief = state_from_elements(Elements(**vars(parameters.chief)))
         self._states = np.array(
@@ -134,6 +135,9 @@ class Plant:
             [parameters.chief_body, *(parameters.deputy[name] for name in parameters.deputies)],
             parameters.epoch,
         )
+        # What a step is worked out in, each in the order of the states.
+        self._forces, self._masses = np.zeros((len(self._states), 3)), np.empty(len(self._states))
+        self._masses[0] = parameters.chief_body.mass
 
     def _satellite(self, name: str, deputy: DeputyParameters) -> _Satellite:
         parameters = self.parameters
@@ -144,11 +148,6 @@ class Plant:
             return _Satellite(name, sensors, thruster, thruster.start(deputy.mass), np.zeros(3))
         except ConfigurationError as error:
             raise ConfigurationError(f"{name}: {error}") from None
-
-    @property
-    def time(self) -> int:
-        """Simulated time of the current tick, ns."""
-        return self.tick * self.parameters.tick_ns
 
     @property
     def finished(self) -> bool:
@@ -208,21 +207,23 @@ class Plant:
         Raises:
             ImpactError: a satellite has come down.
         """
-        masses = np.array([self.parameters.chief_body.mass, *(each.state.mass for each in self._satellites)])
-        thrust = np.zeros((len(masses), 3))
-        for satellite, given in zip(self._satellites, thrust[1:], strict=True):
-            force = forces.get(satellite.name, NO_FORCE).tolist()
-            satellite.missed = satellite.name not in forces or not all(map(math.isfinite, force))
+        missed = []
+        for place, satellite in enumerate(self._satellites, 1):
+            self._masses[place] = satellite.state.mass
             satellite.force, satellite.state, denied = satellite.thruster.apply(
-                force, satellite.eclipse, satellite.state
+                forces.get(satellite.name, NO_FORCE), satellite.eclipse, satellite.state
             )
+            self._forces[place] = satellite.force
+            satellite.missed = satellite.name not in forces or Denial.NOT_FINITE in denied
+            if satellite.missed:
+                missed.append(satellite.name)
             if denied != satellite.denied:
                 self._note(satellite, denied)
-            given[:] = satellite.force
-        accelerations = inertial_acceleration(self._states[0], thrust, masses)
-        self._states = self._propagator.advance(self.time / NANOSECONDS, self._states, accelerations, masses)
+        seconds = self.time / NANOSECONDS
+        self._states = self._propagator.fly(seconds, self._states, self._forces, self._masses)
         self.tick += 1
-        return [satellite.name for satellite in self._satellites if satellite.missed]
+        self.time += self.parameters.tick_ns
+        return missed
 
     def _note(self, satellite: _Satellite, denied: tuple[Denial, ...]) -> None:
         """Note it when the reasons change for which a deputy's thrusters do not give what is asked."""

@@ -1,9 +1,9 @@
 """What a deputy's thrusters make of a command."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from math import copysign, exp, hypot, isfinite
+from typing import NamedTuple
 
 import numpy as np
 
@@ -73,8 +73,7 @@ class Denial(StrEnum):
     TOO_SMALL = "below dead band or minimum impulse"
 
 
-@dataclass(frozen=True, slots=True)
-class ThrusterState:
+class ThrusterState(NamedTuple):
     """What a thruster remembers from tick to tick."""
 
     mass: float
@@ -135,7 +134,7 @@ class Thruster:
         return ThrusterState(mass)
 
     def apply(
-        self, command: Sequence[float] | Vector, eclipse: bool, state: ThrusterState
+        self, command: Vector, eclipse: bool, state: ThrusterState
     ) -> tuple[Vector, ThrusterState, tuple[Denial, ...]]:
         """Fire for one tick.
 
@@ -151,37 +150,41 @@ class Thruster:
         """
         limits = self.parameters
         noise = self._generator.standard_normal(3) if limits.magnitude_noise > 0.0 else None
-        wanted = [float(value) for value in command]
-        denial = self._denial(wanted, eclipse, state)
+        wanted: list[float] = command.tolist()
+        denial = self._denial(wanted, eclipse, state.mass)
         if denial is not None:
             return np.zeros(3), ThrusterState(state.mass), (denial,) if any(wanted) else ()
-        output, reasons = self._valves(wanted)
-        given, end = self._rise(state.output, output)
+        given, reasons = self._valves(wanted)
+        mass, end = state.mass, (given[0], given[1], given[2])
+        if limits.lag > 0.0:
+            given, end = self._rise(state.output, given)
         if noise is not None:
             given = [f * (1.0 + limits.magnitude_noise * float(n)) for f, n in zip(given, noise, strict=True)]
-        mass, share = self._burn(given, state.mass)
-        if share < 1.0:
-            reasons += (Denial.EMPTY,)
-            given, end = [f * share for f in given], (0.0, 0.0, 0.0)
+        if limits.specific_impulse > 0.0:
+            mass, share = self._burn(given, mass)
+            if share < 1.0:
+                reasons += (Denial.EMPTY,)
+                given, end = [f * share for f in given], (0.0, 0.0, 0.0)
         force = np.array(given)
         if limits.misalignment > 0.0:
             force = self._mounting @ force
         return force, ThrusterState(mass, end), reasons
 
-    def _denial(self, wanted: list[float], eclipse: bool, state: ThrusterState) -> Denial | None:
-        if not all(isfinite(value) for value in wanted):
+    def _denial(self, wanted: list[float], eclipse: bool, mass: float) -> Denial | None:
+        limits = self.parameters
+        if not all(map(isfinite, wanted)):
             return Denial.NOT_FINITE
-        if eclipse and self.parameters.off_in_eclipse:
+        if eclipse and limits.off_in_eclipse:
             return Denial.ECLIPSE
-        if self.parameters.specific_impulse > 0.0 and state.mass <= self.parameters.dry_mass:
+        if limits.specific_impulse > 0.0 and mass <= limits.dry_mass:
             return Denial.EMPTY
         return None
 
     def _valves(self, wanted: list[float]) -> tuple[list[float], tuple[Denial, ...]]:
         """What the valves are set to, and what was denied on the way."""
         limits = self.parameters
-        reasons = []
-        output = []
+        reasons: list[Denial] = []
+        output: list[float] = []
         for value, limit, failed in zip(wanted, limits.limit, limits.failed, strict=True):
             if failed and value != 0.0:
                 reasons.append(Denial.FAILED)
@@ -205,15 +208,13 @@ class Thruster:
                     reasons.append(Denial.TOO_SMALL)
                 level = 0.0
             output[axis] = copysign(level, value)
-        return output, tuple(dict.fromkeys(reasons))
+        return output, tuple(dict.fromkeys(reasons)) if reasons else ()
 
     def _rise(
         self, before: tuple[float, float, float], output: list[float]
     ) -> tuple[list[float], tuple[float, float, float]]:
         """Mean force over the tick, and the force at its end, of a first-order lag."""
         lag = self.parameters.lag
-        if lag == 0.0:
-            return output, (output[0], output[1], output[2])
         left = exp(-self._tick / lag)
         mean = lag / self._tick * (1.0 - left)
         given = [to + (now - to) * mean for now, to in zip(before, output, strict=True)]
@@ -223,8 +224,6 @@ class Thruster:
     def _burn(self, given: list[float], mass: float) -> tuple[float, float]:
         """Mass after the tick, and the share of the force that the propellant lasts for."""
         limits = self.parameters
-        if limits.specific_impulse == 0.0:
-            return mass, 1.0
         thrust = hypot(*given) if limits.total_limit > 0.0 else sum(abs(force) for force in given)
         needed = thrust * self._tick / (limits.specific_impulse * STANDARD_GRAVITY)
         if needed <= mass - limits.dry_mass:
