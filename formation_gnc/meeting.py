@@ -1,6 +1,6 @@
 """Brings together what belongs to one tick: by stamp, never by order of arrival."""
 
-from collections import deque
+from collections import OrderedDict
 from collections.abc import Sequence
 from typing import Any
 
@@ -19,31 +19,29 @@ class Meeting:
 
     def __init__(self, topics: Sequence[str], needed: int) -> None:
         """Wait for these topics; the first `needed` (one or more) are indispensable."""
-        self._heard = {topic: deque[Any](maxlen=MEMORY) for topic in topics}
+        self._heard = {topic: OrderedDict[int, Any]() for topic in topics}
         self._pace, self._dispensable = topics[0], tuple(topics[needed:])
         self._lost: frozenset[str] = frozenset()
+        self._now: int | None = None
         self._answered: int | None = None
 
     def take(self, topic: str, record: Any) -> list[Any] | None:
         """Take a record in; once per stamp, the records of all topics in order, None for who is lost."""
-        heard, pace = self._heard[topic], self._heard[self._pace]
-        if heard and heard[-1].time == record.time:
-            heard.pop()
-        elif topic == self._pace and heard and self._dispensable:
-            before = heard[-1].time
-            self._lost = frozenset(each for each in self._dispensable if self._at(each, before) is None)
-        heard.append(record)
-        if not pace or pace[-1].time == self._answered:
+        time, heard = record.time, self._heard[topic]
+        if topic == self._pace and time != self._now:
+            if self._dispensable and self._now is not None:
+                self._lost = frozenset(
+                    each for each in self._dispensable if self._now not in self._heard[each]
+                )
+            self._now = time
+        heard[time] = record
+        if len(heard) > MEMORY:
+            heard.popitem(last=False)
+        now = self._now
+        if now is None or now == self._answered:
             return None
-        now = pace[-1].time
-        records = [None if each in self._lost else self._at(each, now) for each in self._heard]
+        records = [None if each in self._lost else told.get(now) for each, told in self._heard.items()]
         if records.count(None) > len(self._lost):
             return None
         self._answered = now
         return records
-
-    def _at(self, topic: str, time: int) -> Any:
-        for record in reversed(self._heard[topic]):
-            if record.time == time:
-                return record
-        return None

@@ -97,17 +97,18 @@ class Autopilot(Part[Any, Controller]):
             command.fallback,
         )
 
+    @np.errstate(all="ignore")
     def _ask(self, estimate: Estimate, target: Target) -> Command:
         """The law's answer, or no thrust with the reason when there is none to use."""
-        for name, state in (("estimate", estimate.relative_state), ("target", target.relative_state)):
-            if not all(map(isfinite, state.tolist())):
-                return Command(np.zeros(3), fallback=f"{name} not finite: no thrust")
+        state = estimate.relative_state.tolist()
+        if not all(map(isfinite, state + target.relative_state.tolist())):
+            name = "target" if all(map(isfinite, state)) else "estimate"
+            return Command(np.zeros(3), fallback=f"{name} not finite: no thrust")
         if not 0.0 < estimate.mass < inf:
             reason = f"mass is {estimate.mass:g} kg; it must be positive and finite: no thrust"
             return Command(np.zeros(3), fallback=reason)
         try:
-            with np.errstate(all="ignore"):
-                command = self.configuration.design.command(estimate, target)
+            command = self.configuration.design.command(estimate, target)
         except (ArithmeticError, ValueError) as error:  # LinAlgError is a ValueError
             return Command(np.zeros(3), fallback=f"{type(error).__name__}: {error}: no thrust")
         if not all(map(isfinite, command.force.tolist())):

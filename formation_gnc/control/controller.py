@@ -9,7 +9,7 @@ from formation_gnc.interface import Estimate, Matrix, Target, Vector
 from formation_gnc.mission import Mission
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class Command:
     """What a law asks for at a tick, before the thrust limit.
 

@@ -33,9 +33,9 @@ class FeedForward:
     def __call__(self, estimate: Estimate, target: Target) -> tuple[Vector, str]:
         """Acceleration (3,), Hill frame, m/s^2, and why there is none when there should be."""
         if self._kind == "none":
-            return np.zeros(3), ""
+            return NO_THRUST, ""
         if not len(target.preview):
-            return np.zeros(3), "no feed-forward: the target has no preview"
+            return NO_THRUST, "no feed-forward: the target has no preview"
         ahead = target.preview_step
         missing = target.preview[0, 3:] - self._free(estimate, target.relative_state, ahead)[3:]
         acceleration: Vector = self._thrust_over(ahead) @ missing

@@ -324,9 +324,11 @@ class Guide(Part[Any, TargetPath]):
 
     def _predict(self, estimate: Estimate, target: Target, names: list[str]) -> Separation | None:
         """How near the others will come, now and then; warns when that is too near."""
+        if not names:
+            return None
         parameters = self.parameters
         due = estimate.time - self._predicted >= parameters.separation_interval * NANOSECONDS
-        if not (names and due and _is_near(estimate)):
+        if not (due and _is_near(estimate)):
             return None
         self._predicted = estimate.time
         separation = predict(
@@ -347,10 +349,9 @@ class Guide(Part[Any, TargetPath]):
     def _coming_eclipse(self, estimate: Estimate) -> Matrix:
         """Eclipses of the chief, looked for two revolutions ahead in every revolution; of a chief that has no
         orbit nothing new is known, and the next point of an orbit is the time to look again."""
-        revolution = math.tau / self.parameters.mean_motion
         seconds = estimate.time / NANOSECONDS
         if estimate.time >= self._eclipse_due:
-            wait = revolution
+            wait = revolution = math.tau / self.parameters.mean_motion
             try:
                 self._eclipse = seconds + eclipses(
                     estimate.chief_state,

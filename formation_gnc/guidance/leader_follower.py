@@ -32,7 +32,7 @@ class LeaderFollower(Formation):
 
     def __init__(self, parameters: LeaderFollowerParameters, mean_motion: float, slot: int = 0) -> None:
         """Any separation will do."""
-        self._state = np.array([0.0, -(slot + 1) * parameters.separation, 0.0, 0.0, 0.0, 0.0])
+        self._state = np.array([[0.0, -(slot + 1) * parameters.separation, 0.0, 0.0, 0.0, 0.0]])
 
     @staticmethod
     def places(parameters: LeaderFollowerParameters) -> None:
@@ -40,4 +40,4 @@ class LeaderFollower(Formation):
 
     def states(self, times: Vector) -> Matrix:
         """The same state at all times."""
-        return np.full((len(times), 6), self._state)
+        return self._state.repeat(len(times), axis=0)

@@ -19,7 +19,7 @@ LONGEST_STEP = 10.0
 """Integration step (s) above which a flight is divided, as in the plant."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Leg:
     """A flight of the deputy beside the chief."""
 
