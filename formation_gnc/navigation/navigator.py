@@ -506,23 +506,27 @@ class Navigator(Part[NavigationParameters, Design]):
         sensor = readings.sensor.tolist()
         return Taken(sensor, innovation.tolist(), np.sqrt(spread).tolist(), nis, admitted - len(sensor))
 
+    @np.errstate(all="ignore")  # whatever a reading says; what comes of it is compared
     def _weigh(self, flight: Flight, readings: Readings) -> tuple[Readings, Vector, Vector, Matrix] | None:
         """The readings that pass the gate, their innovations, the variances of these and the Jacobian."""
-        with np.errstate(all="ignore"):  # whatever a reading says; what comes of it is compared
-            offset, variance, jacobian = flight.filter.weigh(readings)
-            passed = offset * offset <= self.configuration.design.gate * variance
-            if passed.all():
-                return readings, offset, variance, jacobian
-            distance = np.abs(offset) / np.sqrt(variance)
-        for index in np.flatnonzero(~passed).tolist():
-            name = NAMES[Sensor(int(readings.sensor[index]))]
-            if isfinite(distance[index]):
-                self._refusals.add(Refusal.GATE, name, f"{distance[index]:.1f} standard deviations off")
-            else:
+        offset, variance, jacobian = flight.filter.weigh(readings)
+        gate = self.configuration.design.gate
+        passed = [
+            each * each <= gate * spread
+            for each, spread in zip(offset.tolist(), variance.tolist(), strict=True)
+        ]
+        if all(passed):
+            return readings, offset, variance, jacobian
+        distance = np.abs(offset) / np.sqrt(variance)
+        for sensor, off, fits in zip(readings.sensor.tolist(), distance.tolist(), passed, strict=True):
+            name = NAMES[Sensor(sensor)]
+            if not fits and isfinite(off):
+                self._refusals.add(Refusal.GATE, name, f"{off:.1f} standard deviations off")
+            elif not fits:
                 self._refusals.add(Refusal.NO_DIRECTION, name)
-        if not passed.any():
+        if not any(passed):
             return None
-        readings = readings.select(passed)
+        readings = readings.select(np.array(passed))
         return readings, *flight.filter.weigh(readings)
 
     def _pseudo(self, readings: Readings) -> bool:
