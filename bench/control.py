@@ -15,7 +15,7 @@ from formation_gnc.control.controller import Controller, Vehicle
 from formation_gnc.control.mpc import SETTINGS, ModelPredictiveController, MpcParameters
 from formation_gnc.control.registry import ALGORITHMS, FINITE_HORIZONS
 from formation_gnc.control.weights import QuadraticWeights
-from formation_gnc.interface import NANOSECONDS, Estimate, Target
+from formation_gnc.interface import NANOSECONDS, NavigationState, Target
 from formation_gnc.mission import Mission, Orbit
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.relative.hill import HillModel
@@ -56,7 +56,7 @@ def fly(law: Controller, start: NDArray[np.float64] = START) -> tuple[NDArray[np
     nowhere = np.empty((0, 6))
     for tick in range(TICKS):
         time = tick * NANOSECONDS
-        seen = Estimate(time, state + noise[tick], np.zeros((6, 6)), CHIEF, 100.0, False, [], [], [], 0.0, 0)
+        seen = NavigationState(time, state + noise[tick], CHIEF, 100.0)
         aim = Target(time, "", np.zeros(6), 60.0, nowhere)
         started = thread_time()
         command = law.command(seen, aim)

@@ -75,14 +75,20 @@ class Measurement:
 
 
 @dataclass(slots=True)
-class Estimate:
-    """Relative state of a deputy as its filter knows it."""
+class NavigationState:
+    """What guidance and control use of an estimate: the beginning of its message."""
 
     time: int
     relative_state: Vector  # (6,)
-    covariance: Matrix = field(metadata={"shape": (6, 6)})
     chief_state: Vector  # (6,)
     mass: float
+
+
+@dataclass(slots=True)
+class Estimate(NavigationState):
+    """Relative state of a deputy as its filter knows it."""
+
+    covariance: Matrix = field(metadata={"shape": (6, 6)})
     eclipse: bool
     sensor: list[int]
     innovation: list[float]
@@ -92,15 +98,6 @@ class Estimate:
     refusals: Counts = field(default_factory=lambda: np.zeros(len(Refusal), dtype=np.uint32))  # (12,)
     blind_direction: Vector = field(default_factory=lambda: np.zeros(6))  # (6,)
     blind: str = ""
-
-
-@dataclass(slots=True)
-class Neighbour:
-    """What a deputy needs to know of another one's estimate."""
-
-    time: int
-    relative_state: Vector  # (6,)
-    mass: float
 
 
 NO_ECLIPSE: Matrix = np.empty((0, 2))

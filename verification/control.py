@@ -17,7 +17,7 @@ from formation_gnc.control.controller import Controller, Vehicle
 from formation_gnc.control.hinf import HInfinityController, HinfParameters
 from formation_gnc.control.lqr import LinearQuadraticRegulator, LqrParameters
 from formation_gnc.control.riccati import Weights, stationary_gain
-from formation_gnc.interface import NANOSECONDS, Estimate, Target
+from formation_gnc.interface import NANOSECONDS, NavigationState, Target
 from formation_gnc.mission import Mission, Orbit
 from formation_gnc.orbit.constants import MU
 from formation_gnc.orbit.elements import Elements, state_from_elements
@@ -37,11 +37,9 @@ Array = NDArray[np.float64]
 MINUTE = 60.0
 
 
-def estimate(time: float, state: Array, chief: Array, mass: float) -> Estimate:
+def estimate(time: float, state: Array, chief: Array, mass: float) -> NavigationState:
     """The truth as an estimate."""
-    return Estimate(
-        round(time * NANOSECONDS), state, np.zeros((6, 6)), chief, mass, False, [], [], [], 0.0, 0
-    )
+    return NavigationState(round(time * NANOSECONDS), state, chief, mass)
 
 
 def fly(

@@ -12,7 +12,7 @@ from formation_gnc.control.networks import Networks, Regulator, functions
 from formation_gnc.control.riccati import Weights, continuous_cost_to_go
 from formation_gnc.control.weights import QuadraticWeights
 from formation_gnc.errors import DesignError
-from formation_gnc.interface import NANOSECONDS, Estimate, Target, Vector
+from formation_gnc.interface import NANOSECONDS, NavigationState, Target, Vector
 from formation_gnc.mission import Mission
 from formation_gnc.parameters import parameter
 from formation_gnc.relative.hill import HillModel
@@ -125,7 +125,7 @@ class AdaptiveLinearQuadraticRegulator(Controller):
         ):
             self.networks.remember(before.networks)
 
-    def command(self, estimate: Estimate, target: Target) -> Command:
+    def command(self, estimate: NavigationState, target: Target) -> Command:
         """The force of the regulator and the networks, which learn from this tick."""
         offset = estimate.relative_state - target.relative_state
         error, reason = offset / self._state_unit, self._failure
@@ -142,7 +142,7 @@ class AdaptiveLinearQuadraticRegulator(Controller):
         self._target = None if reason else target  # none: the virtual deputy has stayed behind
         return Command(estimate.mass * self._input_unit * thrust, fallback=reason)
 
-    def _learn(self, estimate: Estimate, target: Target, error: Vector) -> Vector:
+    def _learn(self, estimate: NavigationState, target: Target, error: Vector) -> Vector:
         """Scaled thrust, with the networks corrected by what the last one did."""
         networks, tick = self.networks, self._tick * self._pace
         latitude = self._latitude + self._rate * estimate.time / NANOSECONDS

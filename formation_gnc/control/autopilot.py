@@ -10,7 +10,7 @@ import numpy as np
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
 from formation_gnc.control.registry import ALGORITHMS
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.interface import Estimate, Status, Target, Thrust
+from formation_gnc.interface import NavigationState, Status, Target, Thrust
 from formation_gnc.parameters import parameter
 from formation_gnc.part import Configuration, Part, Schedulable
 
@@ -78,7 +78,7 @@ class Autopilot(Part[Any, Controller]):
         self._predecessor = old.parameters.algorithm
         new.design.take_over(Handover(self._force, self._predecessor, old.design))
 
-    def on_tick(self, estimate: Estimate, target: Target) -> tuple[Thrust, Status]:
+    def on_tick(self, estimate: NavigationState, target: Target) -> tuple[Thrust, Status]:
         """The command for the tick that begins at the estimate's stamp, and how it came about."""
         self.begin_tick(estimate.time)
         command = self._ask(estimate, target)
@@ -98,7 +98,7 @@ class Autopilot(Part[Any, Controller]):
         )
 
     @np.errstate(all="ignore")
-    def _ask(self, estimate: Estimate, target: Target) -> Command:
+    def _ask(self, estimate: NavigationState, target: Target) -> Command:
         """The law's answer, or no thrust with the reason when there is none to use."""
         state = estimate.relative_state.tolist()
         if not all(map(isfinite, state + target.relative_state.tolist())):

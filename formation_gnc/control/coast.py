@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from formation_gnc.control.controller import Command, Controller, Vehicle
-from formation_gnc.interface import Estimate, Target
+from formation_gnc.interface import NavigationState, Target
 from formation_gnc.mission import Mission
 
 
@@ -22,6 +22,6 @@ class Coast(Controller):
     def __init__(self, parameters: CoastParameters, mission: Mission, vehicle: Vehicle) -> None:
         """Nothing to design."""
 
-    def command(self, estimate: Estimate, target: Target) -> Command:
+    def command(self, estimate: NavigationState, target: Target) -> Command:
         """No force."""
         return Command(np.zeros(3))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from formation_gnc.control.linear import LinearController
-from formation_gnc.interface import Estimate, Matrix, Target, Vector
+from formation_gnc.interface import Matrix, NavigationState, Target, Vector
 from formation_gnc.mission import Mission
 
 
@@ -68,7 +68,7 @@ class Controller(ABC):
         """Start from what flew before; called once, before the first `command`."""
 
     @abstractmethod
-    def command(self, estimate: Estimate, target: Target) -> Command:
+    def command(self, estimate: NavigationState, target: Target) -> Command:
         """The force for the tick that begins at the estimate's stamp."""
 
     def figures(self) -> dict[str, Any]:

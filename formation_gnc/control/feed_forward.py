@@ -4,7 +4,7 @@ from math import ceil
 
 import numpy as np
 
-from formation_gnc.interface import NANOSECONDS, Estimate, Matrix, Target, Vector
+from formation_gnc.interface import NANOSECONDS, Matrix, NavigationState, Target, Vector
 from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
 from formation_gnc.orbit.propagation import advance_with_transition
 from formation_gnc.relative.model import NO_THRUST, RelativeModel
@@ -30,7 +30,7 @@ class FeedForward:
         self._model = model
         self._inverse: tuple[float, Matrix] = (0.0, np.zeros((3, 3)))
 
-    def __call__(self, estimate: Estimate, target: Target) -> tuple[Vector, str]:
+    def __call__(self, estimate: NavigationState, target: Target) -> tuple[Vector, str]:
         """Acceleration (3,), Hill frame, m/s^2, and why there is none when there should be."""
         if self._kind == "none":
             return NO_THRUST, ""
@@ -41,7 +41,7 @@ class FeedForward:
         acceleration: Vector = self._thrust_over(ahead) @ missing
         return acceleration, ""
 
-    def _free(self, estimate: Estimate, state: Vector, ahead: float) -> Vector:
+    def _free(self, estimate: NavigationState, state: Vector, ahead: float) -> Vector:
         if self._kind == "linear":
             return self._model.propagate(estimate.time / NANOSECONDS, state, ahead)
         steps = ceil(ahead / LONGEST_STEP)

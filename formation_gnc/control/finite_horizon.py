@@ -13,7 +13,7 @@ from formation_gnc.control.controller import Command, Controller, Handover, Vehi
 from formation_gnc.control.lqr import LinearQuadraticRegulator, LqrParameters
 from formation_gnc.control.weights import QuadraticWeights
 from formation_gnc.errors import ConfigurationError, DesignError
-from formation_gnc.interface import NANOSECONDS, Estimate, Matrix, Target, Vector
+from formation_gnc.interface import NANOSECONDS, Matrix, NavigationState, Target, Vector
 from formation_gnc.mission import Mission
 from formation_gnc.orbit.elements import Elements, elements_from_state
 from formation_gnc.parameters import parameter
@@ -230,7 +230,7 @@ class FiniteHorizonController(Controller):
         if type(handover.law) is type(self):
             self._flight, self._target = handover.law._flight, handover.law._target
 
-    def command(self, estimate: Estimate, target: Target) -> Command:
+    def command(self, estimate: NavigationState, target: Target) -> Command:
         """The force of the plan in force for this tick, or of the law that holds."""
         if self._flight is None or leaps(self._target, target):
             self._flight = _Flight(estimate.time)
@@ -261,7 +261,7 @@ class FiniteHorizonController(Controller):
         waited = (time - flight.tried_at) / NANOSECONDS
         return bool(waited >= self._parameters.replan_interval and to_go > self._parameters.last_plan)
 
-    def _try(self, flight: _Flight, estimate: Estimate, target: Target, to_go: float) -> Plan:
+    def _try(self, flight: _Flight, estimate: NavigationState, target: Target, to_go: float) -> Plan:
         """Plan anew, and put the plan in force if it counts."""
         flight.tried_at = estimate.time
         new = self._answer(flight, estimate, target, to_go)
@@ -270,7 +270,7 @@ class FiniteHorizonController(Controller):
             flight.plan, flight.planned_at = new, estimate.time
         return new
 
-    def _answer(self, flight: _Flight, estimate: Estimate, target: Target, to_go: float) -> Plan:
+    def _answer(self, flight: _Flight, estimate: NavigationState, target: Target, to_go: float) -> Plan:
         """A plan for what is left, with its failure named."""
         nothing = np.zeros((1, 3))
         steps = max(1, math.ceil(to_go / self._parameters.step - 1e-9))

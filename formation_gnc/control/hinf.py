@@ -12,7 +12,7 @@ from formation_gnc.control.mixed_sensitivity import Problem, Weight
 from formation_gnc.control.models import DESIGN_MODELS
 from formation_gnc.control.riccati import spectral_radius
 from formation_gnc.errors import DesignError
-from formation_gnc.interface import Estimate, Matrix, Target, Vector
+from formation_gnc.interface import Matrix, NavigationState, Target, Vector
 from formation_gnc.mission import Mission
 from formation_gnc.parameters import parameter
 
@@ -206,7 +206,7 @@ class HInfinityController(Controller):
         """Start from the force that flew before."""
         self._force = handover.force
 
-    def command(self, estimate: Estimate, target: Target) -> Command:
+    def command(self, estimate: NavigationState, target: Target) -> Command:
         """The force that the controller's states give now, and those states a tick on."""
         error = estimate.relative_state - target.relative_state
         seen = error[: self.sampled.b.shape[1]]

@@ -19,7 +19,7 @@ from formation_gnc.control.riccati import (
     stationary_gain,
 )
 from formation_gnc.errors import DesignError
-from formation_gnc.interface import NANOSECONDS, Estimate, Matrix, Target
+from formation_gnc.interface import NANOSECONDS, Matrix, NavigationState, Target
 from formation_gnc.mission import Mission
 from formation_gnc.parameters import parameter
 from formation_gnc.relative.model import RelativeModel
@@ -175,7 +175,7 @@ class LinearQuadraticRegulator(Controller):
         if self._integrates and isinstance(handover.law, LinearQuadraticRegulator):
             self._integral = handover.law._integral or self._integral
 
-    def command(self, estimate: Estimate, target: Target) -> Command:
+    def command(self, estimate: NavigationState, target: Target) -> Command:
         """The force that the gain asks for against the estimated error, and what the target needs."""
         if self._start is None:
             self._start = estimate.time

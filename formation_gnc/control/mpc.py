@@ -17,7 +17,7 @@ from formation_gnc.control.programme import Programme, facet_normals, facet_reac
 from formation_gnc.control.riccati import Weights, periodic_cost_to_go
 from formation_gnc.control.weights import QuadraticWeights
 from formation_gnc.errors import DesignError
-from formation_gnc.interface import NANOSECONDS, Estimate, Target, Vector
+from formation_gnc.interface import NANOSECONDS, NavigationState, Target, Vector
 from formation_gnc.mission import Mission, Orbit
 from formation_gnc.orbit.constants import EARTH_RADIUS, MU
 from formation_gnc.parameters import parameter
@@ -297,7 +297,7 @@ class ModelPredictiveController(Controller):
         """Start from the force that flew before."""
         self._force = handover.force
 
-    def command(self, estimate: Estimate, target: Target) -> Command:
+    def command(self, estimate: NavigationState, target: Target) -> Command:
         """The plan's force for this tick: from a new plan when one is due, else from the plan in force."""
         time, share = estimate.time, estimate.mass / self._mass
         due = not len(self._plan) or time - self._planned_at >= max(
@@ -344,7 +344,7 @@ class ModelPredictiveController(Controller):
             return Command(self._plan[index], fallback=reason)
         return Command(np.zeros(3)) if len(self._plan) and not reason else None
 
-    def _solve(self, estimate: Estimate, target: Target) -> Command | None:
+    def _solve(self, estimate: NavigationState, target: Target) -> Command | None:
         """The first force of a new plan, or None with the reason in `_answer`."""
         parameters, count = self._parameters, 3 * self._steps
         if not np.abs(estimate.relative_state - target.relative_state).max() < FARTHEST:
@@ -387,7 +387,7 @@ class ModelPredictiveController(Controller):
         return self._programmes[place]
 
     def _error_of_free_motion(
-        self, programme: Programme, estimate: Estimate, target: Target
+        self, programme: Programme, estimate: NavigationState, target: Target
     ) -> tuple[Vector, float]:
         """Scaled gradient at no thrust, and its cost."""
         horizon = self._parameters.horizon
@@ -440,7 +440,9 @@ class ModelPredictiveController(Controller):
         self._constant_bounds = bounds if constant else None
         return bounds
 
-    def _keep_out(self, programme: Programme, estimate: Estimate, target: Target, lower: Vector) -> Vector:
+    def _keep_out(
+        self, programme: Programme, estimate: NavigationState, target: Target, lower: Vector
+    ) -> Vector:
         """Keep to the outside of a plane per step: that which touches the sphere of the satellite that is
         nearest then, where the last plan comes closest to it. The others fly freely.
 

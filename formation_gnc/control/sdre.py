@@ -13,7 +13,7 @@ from formation_gnc.control.lqr import LinearQuadraticRegulator, LqrParameters
 from formation_gnc.control.riccati import Weights, stationary_gain
 from formation_gnc.control.steering import FACTORISATIONS, discretised, state_dependent
 from formation_gnc.errors import ConfigurationError, DesignError
-from formation_gnc.interface import NANOSECONDS, Estimate, Matrix, Target, Vector
+from formation_gnc.interface import NANOSECONDS, Matrix, NavigationState, Target, Vector
 from formation_gnc.mission import Mission
 from formation_gnc.orbit.elements import Elements, elements_from_state
 from formation_gnc.parameters import parameter
@@ -129,7 +129,7 @@ class Sdre(Controller):
             raise self._gain
         return self._gain
 
-    def command(self, estimate: Estimate, target: Target) -> Command:
+    def command(self, estimate: NavigationState, target: Target) -> Command:
         """The force that the gain of now asks for against the estimated error, and what the target needs."""
         state, goal = estimate.relative_state, target.relative_state
         error = state - goal

@@ -19,9 +19,8 @@ from formation_gnc.interface import (
     NANOSECONDS,
     NO_ECLIPSE,
     NOBODY,
-    Estimate,
     Matrix,
-    Neighbour,
+    NavigationState,
     Separation,
     Target,
     Vector,
@@ -168,7 +167,7 @@ class Guide(Part[Any, TargetPath]):
         self._eclipse, self._eclipse_due = NO_ECLIPSE, NEVER
         self._predicted, self._warned = NEVER, False
         self._waits_for = ""
-        self._known: Mapping[str, Estimate | Neighbour] = {}
+        self._known: Mapping[str, NavigationState] = {}
         self._mates: Mapping[str, TargetPath] = {}
 
     def design(self, parameters: Any) -> TargetPath:
@@ -257,7 +256,7 @@ class Guide(Part[Any, TargetPath]):
         self._until = self._time + round(new.parameters.reconfiguration_time * NANOSECONDS)
 
     def on_tick(
-        self, estimate: Estimate, *others: Estimate | Neighbour | None
+        self, estimate: NavigationState, *others: NavigationState | None
     ) -> tuple[Target, Separation | None]:
         """The target at the estimate's stamp, and how near the others will come when that is due.
 
@@ -294,7 +293,7 @@ class Guide(Part[Any, TargetPath]):
         )
         return target, self._predict(estimate, target, list(known))
 
-    def _take_place(self, estimate: Estimate, known: Mapping[str, Estimate | Neighbour]) -> None:
+    def _take_place(self, estimate: NavigationState, known: Mapping[str, NavigationState]) -> None:
         """Take this deputy's place of those that are shared out over the fleet."""
         parameters, fleet = self.parameters, {**known, self._deputy: estimate}
         silent = [name for name in parameters.fleet if name not in fleet]
@@ -322,7 +321,7 @@ class Guide(Part[Any, TargetPath]):
             f"{shared.delta_v[index]:.3g} m/s of the fleet's {sum(shared.delta_v):.3g} m/s",
         )
 
-    def _predict(self, estimate: Estimate, target: Target, names: list[str]) -> Separation | None:
+    def _predict(self, estimate: NavigationState, target: Target, names: list[str]) -> Separation | None:
         """How near the others will come, now and then; warns when that is too near."""
         if not names:
             return None
@@ -346,7 +345,7 @@ class Guide(Part[Any, TargetPath]):
             self.record(estimate.time, "separation", in_words(separation) if warns else "over")
         return separation
 
-    def _coming_eclipse(self, estimate: Estimate) -> Matrix:
+    def _coming_eclipse(self, estimate: NavigationState) -> Matrix:
         """Eclipses of the chief, looked for two revolutions ahead in every revolution; of a chief that has no
         orbit nothing new is known, and the next point of an orbit is the time to look again."""
         seconds = estimate.time / NANOSECONDS
@@ -376,7 +375,7 @@ class Guide(Part[Any, TargetPath]):
                 f"the first revolution, at {size:.3g} m from the chief",
             )
 
-    def _tell_of_the_change(self, estimate: Estimate, target: Vector) -> None:
+    def _tell_of_the_change(self, estimate: NavigationState, target: Vector) -> None:
         to_go = estimate.relative_state - target
         if not (np.isfinite(to_go).all() and estimate.mass > 0.0):
             return
@@ -415,7 +414,7 @@ def _is_same(old: Configuration[Any, TargetPath], new: Configuration[Any, Target
     return np.array_equal(old.design.states(now), new.design.states(now))
 
 
-def _is_near(estimate: Estimate | Neighbour) -> bool:
+def _is_near(estimate: NavigationState) -> bool:
     """Whether state and mass are finite, and such as a satellite in formation can have."""
     return bool((np.abs(estimate.relative_state) < OUT_OF_REACH).all() and 0.0 < estimate.mass < math.inf)
 

@@ -18,7 +18,6 @@ from rosidl_parser.definition import Array, BasicType, NamespacedType, Unbounded
 
 from formation_gnc import interface
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.interface import Neighbour
 from formation_gnc.nodes import cdr
 
 FRAME_IDS = {
@@ -36,7 +35,7 @@ _CODES = {"boolean": "?", "uint8": "B", "uint32": "I", "uint64": "Q", "double": 
 
 def message_type(record_type: type[Any]) -> Any:
     """The message class of the same name, or of what the record is an extract of."""
-    return getattr(messages, "Estimate" if record_type is Neighbour else record_type.__name__)
+    return getattr(messages, "Estimate" if record_type is interface.NavigationState else record_type.__name__)
 
 
 def message_class(type_name: str) -> Any:

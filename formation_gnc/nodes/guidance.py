@@ -1,7 +1,7 @@
 """The guidance node: estimates in, targets out; in a fleet, predicted separations too."""
 
 from formation_gnc.guidance.guide import GuidanceParameters, Guide
-from formation_gnc.interface import Estimate, Neighbour, Separation, Target
+from formation_gnc.interface import NavigationState, Separation, Target
 from formation_gnc.nodes import topics
 from formation_gnc.nodes.shell import PartNode, run
 from formation_gnc.nodes.wires import Wires
@@ -14,12 +14,12 @@ class GuidanceNode(PartNode[Guide]):
         """Listen and speak in the deputy's namespace, and listen to the others of a fleet."""
         super().__init__("guidance", GuidanceParameters, Guide, wires)
         self.publish = self.say(Target, topics.TARGET)
-        others = [f"/{name}/{topics.ESTIMATE}" for name in self.part.others]
-        self.answer(self.on_tick, {topics.ESTIMATE: Estimate}, others)
+        others = {f"/{name}/{topics.ESTIMATE}": NavigationState for name in self.part.others}
+        self.answer(self.on_tick, {topics.ESTIMATE: NavigationState}, others)
         if others:
             self.publish_separation = self.speak(Separation, topics.SEPARATION)
 
-    def on_tick(self, estimate: Estimate, *others: Neighbour | None) -> None:
+    def on_tick(self, estimate: NavigationState, *others: NavigationState | None) -> None:
         """One tick; now and then with a look at how near the others will come."""
         target, separation = self.part.on_tick(estimate, *others)
         self.publish(target)

@@ -9,6 +9,7 @@ from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from time import monotonic, perf_counter
+from types import MappingProxyType
 from typing import Any
 
 import rclpy
@@ -29,7 +30,7 @@ except ImportError:  # other builds of Jazzy do not have it; theirs is slower an
     EventsExecutor = SingleThreadedExecutor
 
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.interface import Event, Neighbour, Timing
+from formation_gnc.interface import Event, Timing
 from formation_gnc.meeting import Meeting
 from formation_gnc.nodes import topics
 from formation_gnc.nodes.conversion import from_cdr, message_type, to_cdr
@@ -200,12 +201,12 @@ class PartNode[P: Part[Any, Any]](ConfiguredNode):
         self,
         respond: Callable[..., None],
         inputs: Mapping[str, type],
-        others: Sequence[str] = (),
+        others: Mapping[str, type] = MappingProxyType({}),
     ) -> None:
         """Call `respond` once per stamp, when one record of it is there from every input topic.
 
-        `others` are topics of estimates of which a :class:`Neighbour` each comes after the inputs. They are
-        not indispensable, and None when they are lost, as :class:`Meeting` says.
+        One of every topic of `others` comes after the inputs. These are not indispensable, and None when they
+        are lost, as :class:`Meeting` says.
 
         A node that comes late is told much of what was said before it came, and goes by the last of it: an
         answer to more would look like a new run to those who have gone on.
@@ -239,13 +240,11 @@ class PartNode[P: Part[Any, Any]](ConfiguredNode):
             for each in latest.values():
                 each()
 
-        for topic, record in inputs.items():
+        for topic, record in {**inputs, **others}.items():
             if topic in self._wires:
                 self._wires.hear(topic, partial(take, topic, lambda each: each))
             else:
                 self.listen(record, topic, partial(arrive, topic, partial(from_cdr, record)))
-        for topic in others:
-            self.listen(Neighbour, topic, partial(arrive, topic, partial(from_cdr, Neighbour)))
 
     def _finish_tick(self, time: int, spent: float) -> None:
         """Publish what nobody waits for: the events, and the wall time (s) that the answer took."""

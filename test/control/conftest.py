@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from formation_gnc.control.controller import Vehicle
-from formation_gnc.interface import NANOSECONDS, NO_ECLIPSE, NOBODY, Estimate, Matrix, Target, Vector
+from formation_gnc.interface import NANOSECONDS, NO_ECLIPSE, NOBODY, Matrix, NavigationState, Target, Vector
 from formation_gnc.mission import Mission, Orbit
 
 
@@ -21,22 +21,17 @@ def vehicle() -> Vehicle:
 
 
 @pytest.fixture(scope="session")
-def estimate() -> Callable[..., Estimate]:
-    """An estimate of a relative state at a time (s)."""
+def estimate() -> Callable[..., NavigationState]:
+    """What an estimate says of a relative state at a time (s)."""
 
-    def build(state: Vector, time: float = 0.0, mass: float = 100.0, chief: Vector | None = None) -> Estimate:
-        return Estimate(
+    def build(
+        state: Vector, time: float = 0.0, mass: float = 100.0, chief: Vector | None = None
+    ) -> NavigationState:
+        return NavigationState(
             time=round(time * NANOSECONDS),
             relative_state=np.asarray(state, dtype=float),
-            covariance=np.zeros((6, 6)),
             chief_state=np.zeros(6) if chief is None else chief,
             mass=mass,
-            eclipse=False,
-            sensor=[],
-            innovation=[],
-            innovation_sigma=[],
-            nis=0.0,
-            status=0,
         )
 
     return build

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.guidance.guide import GuidanceParameters, Guide, check_places
-from formation_gnc.interface import NANOSECONDS, Estimate, Target
+from formation_gnc.interface import NANOSECONDS, NavigationState, Target
 from formation_gnc.parameters import load
 from formation_gnc.relative.hill import HillModel
 
@@ -25,10 +25,8 @@ def parameters(**values: Any) -> Any:
     return load(GuidanceParameters, {"chief.semi_major_axis": 7.0e6, "fleet": FLEET} | RING | given)
 
 
-def estimate(state: Array, seconds: float = 0.0, mass: float = 100.0) -> Estimate:
-    return Estimate(
-        round(seconds * NANOSECONDS), state, np.eye(6), np.zeros(6), mass, False, [], [], [], 0.0, 0
-    )
+def estimate(state: Array, seconds: float = 0.0, mass: float = 100.0) -> NavigationState:
+    return NavigationState(round(seconds * NANOSECONDS), state, np.zeros(6), mass)
 
 
 def fly(

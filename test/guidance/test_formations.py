@@ -16,7 +16,7 @@ from formation_gnc.guidance.formation import Formation
 from formation_gnc.guidance.guide import GuidanceParameters, Guide
 from formation_gnc.guidance.leader_follower import LeaderFollower, LeaderFollowerParameters
 from formation_gnc.guidance.relative_orbit import RelativeOrbit, RelativeOrbitParameters
-from formation_gnc.interface import NANOSECONDS, Estimate
+from formation_gnc.interface import NANOSECONDS, NavigationState
 from formation_gnc.mission import Mission, Orbit
 from formation_gnc.parameters import load
 
@@ -121,28 +121,16 @@ def guide(**values: Any) -> Guide:
 
 
 @pytest.fixture(scope="module")
-def at() -> Callable[[float], Estimate]:
+def at() -> Callable[[float], NavigationState]:
     """An estimate at a time in s."""
 
-    def build(second: float) -> Estimate:
-        return Estimate(
-            time=round(second * NANOSECONDS),
-            relative_state=np.zeros(6),
-            covariance=np.eye(6),
-            chief_state=np.zeros(6),
-            mass=100.0,
-            eclipse=False,
-            sensor=[],
-            innovation=[],
-            innovation_sigma=[],
-            nis=0.0,
-            status=0,
-        )
+    def build(second: float) -> NavigationState:
+        return NavigationState(round(second * NANOSECONDS), np.zeros(6), np.zeros(6), 100.0)
 
     return build
 
 
-def test_the_target_is_the_formations_state_at_the_stamp(at: Callable[[float], Estimate]) -> None:
+def test_the_target_is_the_formations_state_at_the_stamp(at: Callable[[float], NavigationState]) -> None:
     target = guide(formation="relative_orbit", relative_orbit__rho=300.0).on_tick(at(77.0))[0]
     formation = RelativeOrbit(RelativeOrbitParameters(rho=300.0), OMEGA)
     assert (target.time, target.formation) == (77 * NANOSECONDS, "relative_orbit")
@@ -150,14 +138,14 @@ def test_the_target_is_the_formations_state_at_the_stamp(at: Callable[[float], E
     assert target.preview.shape == (0, 6)
 
 
-def test_the_preview_is_where_the_target_will_be(at: Callable[[float], Estimate]) -> None:
+def test_the_preview_is_where_the_target_will_be(at: Callable[[float], NavigationState]) -> None:
     ahead = guide(formation="relative_orbit", preview_steps=4, preview_step=30.0)
     preview = ahead.on_tick(at(10.0))[0].preview
     later = [ahead.on_tick(at(10.0 + 30.0 * step))[0].relative_state.tolist() for step in (1, 2, 3, 4)]
     assert preview.tolist() == later
 
 
-def test_a_formation_is_swapped_in_flight_at_a_tick(at: Callable[[float], Estimate]) -> None:
+def test_a_formation_is_swapped_in_flight_at_a_tick(at: Callable[[float], NavigationState]) -> None:
     swapped = guide(schedule=["{at: 20, formation: relative_orbit, relative_orbit.rho: 50}"])
     assert swapped.on_tick(at(19.0))[0].relative_state.tolist() == [0.0, -100.0, 0.0, 0.0, 0.0, 0.0]
     target, _ = swapped.on_tick(at(20.0))

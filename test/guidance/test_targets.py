@@ -14,7 +14,7 @@ from formation_gnc.errors import ConfigurationError
 from formation_gnc.guidance.guide import GuidanceParameters, Guide, check_places
 from formation_gnc.guidance.registry import FORMATIONS
 from formation_gnc.guidance.targets import TARGET_MODELS, TargetPath
-from formation_gnc.interface import NANOSECONDS, Estimate
+from formation_gnc.interface import NANOSECONDS, NavigationState
 from formation_gnc.mission import Mission, Orbit
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
@@ -133,14 +133,12 @@ def guide(**values: Any) -> Guide:
 
 
 @pytest.fixture(scope="module")
-def at() -> Callable[..., Estimate]:
+def at() -> Callable[..., NavigationState]:
     """An estimate at a time in s, of a satellite 100 m behind."""
 
-    def build(second: float) -> Estimate:
+    def build(second: float) -> NavigationState:
         behind = np.array([0.0, -100.0, 0.0, 0.0, 0.0, 0.0])
-        return Estimate(
-            round(second * NANOSECONDS), behind, np.eye(6), np.zeros(6), 100.0, False, [], [], [], 0.0, 0
-        )
+        return NavigationState(round(second * NANOSECONDS), behind, np.zeros(6), 100.0)
 
     return build
 
@@ -149,7 +147,7 @@ def told(guided: Guide) -> list[tuple[str, str]]:
     return [(event.kind, event.detail) for event in guided.take_events()]
 
 
-def test_a_model_that_does_not_serve_is_told_once(at: Callable[..., Estimate]) -> None:
+def test_a_model_that_does_not_serve_is_told_once(at: Callable[..., NavigationState]) -> None:
     guided = guide(formation="projected_circular_orbit", projected_circular_orbit__size=50_000.0)
     guided.on_tick(at(0.0))
     guided.on_tick(at(1.0))
@@ -164,7 +162,7 @@ def test_a_model_that_does_not_serve_is_told_once(at: Callable[..., Estimate]) -
     assert told(served) == []
 
 
-def test_a_change_of_target_tells_the_shortest_time(at: Callable[..., Estimate]) -> None:
+def test_a_change_of_target_tells_the_shortest_time(at: Callable[..., NavigationState]) -> None:
     guided = guide(schedule=["{at: 10, leader_follower.separation: 300}"])
     guided.on_tick(at(9.0))
     assert told(guided) == []
@@ -178,14 +176,14 @@ def test_a_change_of_target_tells_the_shortest_time(at: Callable[..., Estimate])
 
 
 def test_a_target_out_of_reach_in_the_time_given_is_reported_and_flown_to(
-    at: Callable[..., Estimate],
+    at: Callable[..., NavigationState],
 ) -> None:
     guided = guide(reconfiguration_time=100.0, schedule=["{at: 10, leader_follower.separation: 300}"])
     assert guided.on_tick(at(10.0))[0].relative_state[1] == -300.0
     assert [kind for kind, _ in told(guided)] == ["parameters", "infeasible"]
 
 
-def test_no_change_is_taken_while_another_is_under_way(at: Callable[..., Estimate]) -> None:
+def test_no_change_is_taken_while_another_is_under_way(at: Callable[..., NavigationState]) -> None:
     guided = guide(reconfiguration_time=100.0, schedule=["{at: 50, leader_follower.separation: 150}"])
     guided.adopt(guided.prepare({"leader_follower.separation": 120.0}))
     guided.on_tick(at(10.0))
@@ -221,7 +219,7 @@ def test_what_is_no_formation_is_refused_with_a_reason(values: dict[str, Any], r
         guide(**values)
 
 
-def test_a_refused_change_leaves_the_target(at: Callable[..., Estimate]) -> None:
+def test_a_refused_change_leaves_the_target(at: Callable[..., NavigationState]) -> None:
     guided = guide()
     with pytest.raises(ConfigurationError):
         guided.prepare({"formation": "tetrahedral", "slot": 9})
@@ -245,9 +243,7 @@ CHIEF = state_from_elements(Elements(7.0e6, 0.0, 0.4, 0.0, 0.0, 0.0))
 
 def eclipse_of(guided: Guide, seconds: float, chief: Array) -> Array:
     time = round(seconds * NANOSECONDS)
-    return guided.on_tick(Estimate(time, np.ones(6), np.eye(6), chief, 1.0, False, [], [], [], 0.0, 0))[
-        0
-    ].eclipse
+    return guided.on_tick(NavigationState(time, np.ones(6), chief, 1.0))[0].eclipse
 
 
 def test_the_coming_eclipses_come_with_the_target_until_they_are_over() -> None:
@@ -268,7 +264,7 @@ def test_the_coming_eclipses_come_with_the_target_until_they_are_over() -> None:
     assert again[0] == pytest.approx(first[1], abs=0.1)
 
 
-def test_a_chief_that_flies_nowhere_has_no_eclipse(at: Callable[..., Estimate]) -> None:
+def test_a_chief_that_flies_nowhere_has_no_eclipse(at: Callable[..., NavigationState]) -> None:
     assert not len(guide().on_tick(at(0.0))[0].eclipse)
 
 

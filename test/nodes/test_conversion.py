@@ -20,7 +20,7 @@ from formation_gnc.nodes.raw_topics import first_stamp
 from formation_gnc.recording.decode import installed_type
 
 RECORDS = [each for each in vars(interface).values() if dataclasses.is_dataclass(each)]
-RECORDS.remove(interface.Neighbour)  # an extract of an estimate
+RECORDS.remove(interface.NavigationState)  # an extract of an estimate
 MESSAGES = [each for each in RECORDS if each is not interface.SatelliteTruth]  # is only ever part of one
 SCALARS: dict[str, st.SearchStrategy[Any]] = {
     "double": st.floats(),  # with NaNs, infinities, signed zeros and subnormals
@@ -169,12 +169,15 @@ def test_numbers_that_stand_for_something_stand_for_the_same_in_records_and_mess
 
 
 @given(records(interface.Estimate), st.sampled_from(["hill", "", "rtn ", "lvlh", "deputy1/hill"]))
-def test_a_neighbour_is_read_from_an_estimate_in_any_frame(estimate: interface.Estimate, frame: str) -> None:
+def test_a_navigation_state_is_read_from_an_estimate_in_any_frame(
+    estimate: interface.Estimate, frame: str
+) -> None:
     message = deserialize_message(to_cdr(estimate), messages.Estimate)
     message.header.frame_id = frame
-    heard = from_cdr(interface.Neighbour, serialize_message(message))
+    heard = from_cdr(interface.NavigationState, serialize_message(message))
     assert (heard.time, struct.pack("<d", heard.mass)) == (estimate.time, struct.pack("<d", estimate.mass))
     assert heard.relative_state.tobytes() == estimate.relative_state.tobytes()
+    assert heard.chief_state.tobytes() == estimate.chief_state.tobytes()
 
 
 def test_numbers_the_other_way_round_are_read_too() -> None:
