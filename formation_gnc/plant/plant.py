@@ -1,7 +1,7 @@
 """The truth of a run: chief and deputies, what drives them and what they measure."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,7 +20,7 @@ from formation_gnc.orbit.frames import (
 from formation_gnc.orbit.propagation import Propagator
 from formation_gnc.parameters import parameter, per_name
 from formation_gnc.plant.sensors import Sensors, SensorSuite
-from formation_gnc.plant.thrusters import Denial, Thruster, ThrusterParameters, ThrusterState
+from formation_gnc.plant.thrusters import NO_FORCE, Denial, Thruster, ThrusterParameters, ThrusterState
 from formation_gnc.randomness import generator
 
 
@@ -91,8 +91,6 @@ class PlantParameters(Mission):
 
 NO_FIX = np.zeros(6)
 NO_FIX.setflags(write=False)
-NO_FORCE = np.zeros(3)
-NO_FORCE.setflags(write=False)
 
 
 @dataclass
@@ -103,8 +101,6 @@ class _Satellite:
     sensors: Sensors
     thruster: Thruster
     state: ThrusterState
-    force: Vector
-    """Given over the tick before, Hill frame at its start, N."""
     eclipse: bool = False
     missed: bool = True
     denied: tuple[Denial, ...] = ()
@@ -127,6 +123,8 @@ class Plant:
         self._states = np.array(
             [chief, *(_start(chief, name, parameters.deputy[name]) for name in parameters.deputies)]
         )
+        self._forces = np.zeros((len(self._states), 3))
+        """Given over the tick before, Hill frame at its start, N; in the order of the states."""
         self._satellites = [self._satellite(name, parameters.deputy[name]) for name in parameters.deputies]
         self._propagator = Propagator(
             parameters.tick,
@@ -135,9 +133,6 @@ class Plant:
             [parameters.chief_body, *(parameters.deputy[name] for name in parameters.deputies)],
             parameters.epoch,
         )
-        # What a step is worked out in, each in the order of the states.
-        self._forces, self._masses = np.zeros((len(self._states), 3)), np.empty(len(self._states))
-        self._masses[0] = parameters.chief_body.mass
 
     def _satellite(self, name: str, deputy: DeputyParameters) -> _Satellite:
         parameters = self.parameters
@@ -145,7 +140,7 @@ class Plant:
         random = generator(parameters.seed, f"{name}/thrusters")
         try:
             thruster = Thruster(deputy.thrusters, parameters.tick, random)
-            return _Satellite(name, sensors, thruster, thruster.start(deputy.mass), np.zeros(3))
+            return _Satellite(name, sensors, thruster, thruster.start(deputy.mass))
         except ConfigurationError as error:
             raise ConfigurationError(f"{name}: {error}") from None
 
@@ -158,7 +153,8 @@ class Plant:
         """What each deputy measures of the truth at the current tick; once per tick, before `step`."""
         chief, seconds = self._states[0], self.time / NANOSECONDS
         measurements = {}
-        for satellite, state in zip(self._satellites, self._states[1:], strict=True):
+        for place, satellite in enumerate(self._satellites, 1):  # an array ends its iteration with an error
+            state = self._states[place]
             satellite.eclipse = self._propagator.illumination(seconds, state) < 1.0
             sensors, readings, ages = satellite.sensors.readings(self.tick, state, chief)
             measurements[satellite.name] = Measurement(
@@ -167,7 +163,7 @@ class Plant:
                 sensor=sensors,
                 reading=readings,
                 age=ages,
-                applied_force=satellite.force,
+                applied_force=self._forces[place],
                 mass=satellite.state.mass,
                 eclipse=satellite.eclipse,
                 fix_available=satellite.missed,
@@ -180,18 +176,17 @@ class Plant:
 
     def truth(self) -> Truth:
         """The truth at the current tick; after `measure`."""
+        relative = relative_to_first(self._states)
         deputies = [
             SatelliteTruth(
                 satellite.name,
-                state,
-                relative,
-                satellite.force,
+                self._states[place],
+                relative[place - 1],
+                self._forces[place],
                 satellite.state.mass,
                 satellite.eclipse,
             )
-            for satellite, state, relative in zip(
-                self._satellites, self._states[1:], relative_to_first(self._states), strict=True
-            )
+            for place, satellite in enumerate(self._satellites, 1)
         ]
         return Truth(self.time, self._states[0], deputies)
 
@@ -207,20 +202,24 @@ class Plant:
         Raises:
             ImpactError: a satellite has come down.
         """
+        given: list[Sequence[float]] = [NO_FORCE]
+        masses = [self.parameters.chief_body.mass]
         missed = []
-        for place, satellite in enumerate(self._satellites, 1):
-            self._masses[place] = satellite.state.mass
-            satellite.force, satellite.state, denied = satellite.thruster.apply(
-                forces.get(satellite.name, NO_FORCE), satellite.eclipse, satellite.state
+        for satellite in self._satellites:
+            asked = forces.get(satellite.name)
+            masses.append(satellite.state.mass)
+            force, satellite.state, denied = satellite.thruster.apply(
+                NO_FORCE if asked is None else asked.tolist(), satellite.eclipse, satellite.state
             )
-            self._forces[place] = satellite.force
-            satellite.missed = satellite.name not in forces or Denial.NOT_FINITE in denied
+            given.append(force)
+            satellite.missed = asked is None or Denial.NOT_FINITE in denied
             if satellite.missed:
                 missed.append(satellite.name)
             if denied != satellite.denied:
                 self._note(satellite, denied)
+        self._forces = np.array(given)
         seconds = self.time / NANOSECONDS
-        self._states = self._propagator.fly(seconds, self._states, self._forces, self._masses)
+        self._states = self._propagator.fly(seconds, self._states, self._forces, np.array(masses))
         self.tick += 1
         self.time += self.parameters.tick_ns
         return missed

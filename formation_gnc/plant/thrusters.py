@@ -1,15 +1,17 @@
 """What a deputy's thrusters make of a command."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from math import copysign, exp, hypot, isfinite
-from typing import NamedTuple
 
 import numpy as np
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.interface import Vector
 from formation_gnc.parameters import parameter
+
+NO_FORCE = (0.0, 0.0, 0.0)
 
 STANDARD_GRAVITY = 9.80665
 """By which specific impulse is counted, m/s^2."""
@@ -73,13 +75,14 @@ class Denial(StrEnum):
     TOO_SMALL = "below dead band or minimum impulse"
 
 
-class ThrusterState(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class ThrusterState:
     """What a thruster remembers from tick to tick."""
 
     mass: float
     """Of the whole satellite, kg."""
-    output: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Force at the end of the tick, before noise and misalignment, N: the memory of the lag."""
+    output: tuple[float, float, float] = NO_FORCE
+    """Memory of the lag: force at the end of the tick, before noise and misalignment, N."""
 
 
 class Thruster:
@@ -134,8 +137,8 @@ class Thruster:
         return ThrusterState(mass)
 
     def apply(
-        self, command: Vector, eclipse: bool, state: ThrusterState
-    ) -> tuple[Vector, ThrusterState, tuple[Denial, ...]]:
+        self, command: Sequence[float], eclipse: bool, state: ThrusterState
+    ) -> tuple[Sequence[float], ThrusterState, tuple[Denial, ...]]:
         """Fire for one tick.
 
         Args:
@@ -150,29 +153,28 @@ class Thruster:
         """
         limits = self.parameters
         noise = self._generator.standard_normal(3) if limits.magnitude_noise > 0.0 else None
-        wanted: list[float] = command.tolist()
-        denial = self._denial(wanted, eclipse, state.mass)
+        denial = self._denial(command, eclipse, state.mass)
         if denial is not None:
-            return np.zeros(3), ThrusterState(state.mass), (denial,) if any(wanted) else ()
-        given, reasons = self._valves(wanted)
-        mass, end = state.mass, (given[0], given[1], given[2])
+            return NO_FORCE, ThrusterState(state.mass), (denial,) if any(command) else ()
+        force, reasons = self._valves(command)
         if limits.lag > 0.0:
-            given, end = self._rise(state.output, given)
+            force, end = self._rise(state.output, force)
+            state = ThrusterState(state.mass, end)
         if noise is not None:
-            given = [f * (1.0 + limits.magnitude_noise * float(n)) for f, n in zip(given, noise, strict=True)]
+            force = [f * (1.0 + limits.magnitude_noise * float(n)) for f, n in zip(force, noise, strict=True)]
         if limits.specific_impulse > 0.0:
-            mass, share = self._burn(given, mass)
+            mass, share = self._burn(force, state.mass)
+            state = ThrusterState(mass, state.output)
             if share < 1.0:
                 reasons += (Denial.EMPTY,)
-                given, end = [f * share for f in given], (0.0, 0.0, 0.0)
-        force = np.array(given)
+                force, state = [f * share for f in force], ThrusterState(mass)
         if limits.misalignment > 0.0:
-            force = self._mounting @ force
-        return force, ThrusterState(mass, end), reasons
+            force = (self._mounting @ np.array(force)).tolist()
+        return force, state, reasons
 
-    def _denial(self, wanted: list[float], eclipse: bool, mass: float) -> Denial | None:
+    def _denial(self, command: Sequence[float], eclipse: bool, mass: float) -> Denial | None:
         limits = self.parameters
-        if not all(map(isfinite, wanted)):
+        if not all(map(isfinite, command)):
             return Denial.NOT_FINITE
         if eclipse and limits.off_in_eclipse:
             return Denial.ECLIPSE
@@ -180,13 +182,14 @@ class Thruster:
             return Denial.EMPTY
         return None
 
-    def _valves(self, wanted: list[float]) -> tuple[list[float], tuple[Denial, ...]]:
+    def _valves(self, command: Sequence[float]) -> tuple[list[float], tuple[Denial, ...]]:
         """What the valves are set to, and what was denied on the way."""
         limits = self.parameters
         reasons: list[Denial] = []
         output: list[float] = []
-        for value, limit, failed in zip(wanted, limits.limit, limits.failed, strict=True):
-            if failed and value != 0.0:
+        for axis, value in enumerate(command):
+            limit = limits.limit[axis]
+            if limits.failed[axis] and value != 0.0:
                 reasons.append(Denial.FAILED)
                 value = 0.0
             if abs(value) > limit:
