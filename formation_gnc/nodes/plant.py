@@ -56,7 +56,7 @@ class PlantNode(ConfiguredNode):
         self._flying = False
         self._recorded: int | None = None
         self._recorder_is_there = False
-        self._held = False
+        self._recorder_lag = RECORDER_LAG * self.values.tick_ns
         self._misses = 0
         self._started = self._tick_started = self._reported = self._looked = monotonic()
         self._said = ""
@@ -94,37 +94,36 @@ class PlantNode(ConfiguredNode):
             self._report("flying")
         return self.plant.finished
 
-    def _advance_if_ready(self) -> None:
-        if (
-            not self._awaited
-            and not self.plant.finished
-            and self._recorder_keeps_up()
-            and self._wait_for_pace() <= 0.0
-        ):
-            self._advance()
-
     def _on_thrust(self, name: str, data: bytes) -> None:
         thrust = from_cdr(Thrust, data)
-        if name not in self._awaited or thrust.time != self.plant.time:
-            return
-        self._awaited.discard(name)
-        self._answered_before.add(name)
-        self._forces[name] = thrust.force
-        self._advance_if_ready()
+        if name in self._awaited and thrust.time == self.plant.time:
+            self._awaited.discard(name)
+            self._answered_before.add(name)
+            self._forces[name] = thrust.force
+            self._advance_if_ready()
 
-    def _advance(self) -> None:
-        tick, time = self.plant.tick, self.plant.time
-        for name in self.plant.step(self._forces):
+    def _advance_if_ready(self) -> None:
+        """Fly the tick if all have answered, the recorder keeps up and it is time."""
+        plant = self.plant
+        if (
+            self._awaited
+            or plant.finished
+            or (self._recorder_is_there and plant.time > (self._recorded or 0) + self._recorder_lag)
+            or self._wait_for_pace() > 0.0
+        ):
+            return
+        tick, time = plant.tick, plant.time
+        for name in plant.step(self._forces):
             detail = f"{name} {self._reason_of_miss(name)}: no thrust"
             self.get_logger().warning(f"tick {tick}: miss: {detail}")
             self._tell_event(time, tick, "miss", detail)
             self._misses += 1
-        for event in self.plant.take_events():
+        for event in plant.take_events():
             self.get_logger().info(f"tick {event.tick}: {event.kind}: {event.detail}")
             self._events(event)
-        if self.plant.finished:
-            detail = f"{self.plant.tick} ticks flown, {self._misses} missed"
-            self._tell_event(self.plant.time, self.plant.tick, "end", detail)
+        if plant.finished:
+            detail = f"{plant.tick} ticks flown, {self._misses} missed"
+            self._tell_event(plant.time, plant.tick, "end", detail)
             self._report("finished")
         else:
             self._publish_tick()
@@ -140,7 +139,7 @@ class PlantNode(ConfiguredNode):
 
     def _publish_tick(self) -> None:
         self._forces = {}
-        self._awaited = set(self.values.deputies)
+        self._awaited.update(self.values.deputies)
         self._tick_started = monotonic()
         for name, measurement in self.plant.measure().items():  # first, since everybody waits for them
             self._measurement[name](measurement)
@@ -153,13 +152,8 @@ class PlantNode(ConfiguredNode):
 
     def _on_recorded(self, message: Clock) -> None:
         self._recorded = message.clock.sec * NANOSECONDS + message.clock.nanosec
-        if self._held:
+        if self._flying:
             self._advance_if_ready()
-
-    def _recorder_keeps_up(self) -> bool:
-        lag = self.plant.time - (self._recorded or 0)
-        self._held = self._recorder_is_there and lag > RECORDER_LAG * self.values.tick_ns
-        return not self._held
 
     def wait_for_recorder(self) -> bool:
         """Whether a recorder is there that has not got the last tick yet."""
