@@ -5,6 +5,7 @@ Independent of the package's relative-motion models: Pontryagin's conditions in 
 potential of a point mass and J2 written out here, solved by shooting and by collocation with SciPy.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,24 @@ from scipy.integrate import solve_bvp, solve_ivp
 from formation_gnc.orbit.constants import EARTH_RADIUS, J2
 
 Array = NDArray[np.float64]
+
+
+def collocated(
+    rate: Callable[[Array, Array], Array],
+    ends: Callable[[Array, Array], Array],
+    times: Array,
+    guess: Array,
+    tolerance: float,
+    at: Array,
+) -> Array:
+    """States (n, K) at times (K,) of ds/dt = rate(t, s) between two ends, where `ends` is zero.
+
+    Raises RuntimeError when collocation from a guess (n, N) at times (N,) does not get there.
+    """
+    found = solve_bvp(rate, ends, times, guess, tol=tolerance, max_nodes=20_000)
+    if found.status != 0:
+        raise RuntimeError(found.message)
+    return np.asarray(found.sol(at))
 
 
 @dataclass(frozen=True)
@@ -120,16 +139,8 @@ def regulated(field: Field, start: Array, goal: Array, duration: float, tau: flo
 
     moments = np.linspace(0.0, duration / tau, 201)
     guess = np.concatenate([np.outer(first, np.exp(-moments)), np.zeros((6, len(moments)))])
-    found = solve_bvp(
-        rate,
-        lambda begin, end: np.concatenate([begin[:6] - first, end[6:]]),
-        moments,
-        guess,
-        tol=1e-7,
-        max_nodes=20_000,
-    )
-    if found.status != 0:
-        raise RuntimeError(found.message)
     fine = np.linspace(0.0, duration / tau, 20_001)
-    path = found.sol(fine)
+    path = collocated(
+        rate, lambda begin, end: np.concatenate([begin[:6] - first, end[6:]]), moments, guess, 1e-7, fine
+    )
     return size**2 / tau**3 * float(np.trapezoid(np.sum(path[:3] ** 2 + path[9:] ** 2, axis=0), fine))

@@ -11,10 +11,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from numpy.linalg import LinAlgError
 from numpy.typing import NDArray
-from scipy.integrate import solve_bvp
 
 from formation_gnc.control.steering import Cost, Sequence, System, approximating_sequence
 from verification.figure import Figure, save
+from verification.optimum import collocated
 from verification.seeds.accepted import Ours
 
 Array = NDArray[np.float64]
@@ -158,17 +158,14 @@ def optimum(transfer: Transfer, weight: float) -> float:
 
     grid = np.linspace(0.0, transfer.duration, STEPS + 1)
     guess = np.vstack([transfer.line.T, np.zeros((4, STEPS + 1))])
-    found = solve_bvp(
+    path = collocated(
         rate,
         lambda begin, end: np.concatenate([begin[:4] - START, end[:4] - transfer.goal]),
         grid,
         guess,
-        tol=1e-8,
-        max_nodes=20_000,
+        1e-8,
+        np.linspace(0.0, transfer.duration, 10 * STEPS + 1),
     )
-    if found.status != 0:
-        raise RuntimeError(found.message)
-    path = found.sol(np.linspace(0.0, transfer.duration, 10 * STEPS + 1))
     density = weight * np.sum(path[:4] ** 2, axis=0) + path[6] ** 2 + (path[7] / path[0]) ** 2
     return 0.5 * float(np.trapezoid(density, dx=transfer.duration / (10 * STEPS)))
 

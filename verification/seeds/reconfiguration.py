@@ -6,8 +6,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
-from formation_gnc.control.finite_horizon import FiniteHorizonController
-from formation_gnc.control.registry import ALGORITHMS
+from formation_gnc.control.registry import FINITE_HORIZONS
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
 from verification.figure import Figure, save
@@ -20,7 +19,7 @@ LAWS = ("lqr", "adaptive_lqr", "sdre", "sdre_finite", "asre", "mpsp", "gmpsp")
 
 def fly(law: str) -> tuple[Any, Any, set[str]]:
     """Distance from the target (N,), m, forces (N, 3), N, and what failed."""
-    own = {f"{law}.final_time": FINAL} if issubclass(ALGORITHMS[law], FiniteHorizonController) else {}
+    own = {f"{law}.final_time": FINAL} if law in FINITE_HORIZONS else {}
     run = Run(
         load_scenario(
             "eccentric_leo",
@@ -80,7 +79,7 @@ def section(directory: Path) -> tuple[str, list[Figure]]:
         times = TICK * np.arange(len(error))
         distance.semilogy(times, error, lw=width, label=law)
         thrust.plot(times, 1e3 * np.abs(force).max(axis=1), lw=width, label=law)
-        if issubclass(ALGORITHMS[law], FiniteHorizonController):
+        if law in FINITE_HORIZONS:
             figures += [
                 Figure(f"{law}: error at the final time", "", float(error[arrival]), "m", 0.0, MISS[law]),
                 Figure(f"{law}: plans that failed", "", len(failures), "", 0, 0),
