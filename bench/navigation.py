@@ -27,9 +27,7 @@ class _Bare(ExtendedKalmanFilter):  # type: ignore[misc]
     """FilterPy's filter as a user writes it down: a nonlinear prediction, and its own covariance."""
 
     def fly(self, leg: Leg, nothing: Array) -> None:
-        self.moved, _, self.F = kernels.fly(
-            leg.chief, leg.next_chief, self.x, self.P, nothing, leg.acceleration, leg.duration, leg.substeps
-        )
+        self.moved, _, self.F = NonlinearProcess().predict(leg, self.x, self.P, nothing)
         self.predict()
 
     def predict_x(self, u: float = 0) -> None:

@@ -86,7 +86,7 @@ class ExtendedFilter(ExtendedKalmanFilter):  # type: ignore[misc]
         scale = np.sqrt(variance)
         jacobian = jacobian / scale[:, None]
         self.update(innovation / scale, lambda _: jacobian, lambda _: 0.0, R=noise)
-        self.P, _ = kernels.settle(self.P)
+        kernels.settle(self.P)
         return float(self.y @ self.SI @ self.y)
 
 
@@ -106,8 +106,8 @@ class UnscentedFilter(UnscentedKalmanFilter):  # type: ignore[misc]
         """Move the points; the transition matrix is that of the mean."""
         *_, transition = process.predict(leg, self.x, self.P, noise)
         self.sigmas_f = process.move(leg, self.points_fn.sigma_points(self.x, self.P))
-        self.x, covariance = unscented_transform(self.sigmas_f, self.Wm, self.Wc, noise)
-        self.P, _ = kernels.settle(covariance)
+        self.x, self.P = unscented_transform(self.sigmas_f, self.Wm, self.Wc, noise)
+        kernels.settle(self.P)
         return transition
 
     def weigh(self, readings: Readings) -> tuple[Vector, Vector, Matrix]:
@@ -137,7 +137,7 @@ class UnscentedFilter(UnscentedKalmanFilter):  # type: ignore[misc]
         read, noise = read / scale, noise / (scale[:, None] * scale)
         points = iter(read)
         self.update(np.zeros(read.shape[1]), R=noise, hx=lambda _: next(points))
-        self.P, _ = kernels.settle(self.P)
+        kernels.settle(self.P)
         return float(self.y @ self.SI @ self.y)
 
 

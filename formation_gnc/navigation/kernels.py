@@ -1,7 +1,8 @@
 """The filter's arithmetic, compiled: what it does at every tick costs less than calling NumPy for it.
 
 The frames are those of `formation_gnc.orbit.frames`, the motion that of `formation_gnc.orbit.propagation`.
-Plain loops, so that the bits do not depend on a linear-algebra library.
+Plain loops, so that the bits do not depend on a linear-algebra library. What every tick calls changes the
+arrays it is given: to make Python an array of a result costs more than all else of a call.
 """
 
 from math import atan2, sqrt
@@ -19,6 +20,9 @@ from formation_gnc.orbit.propagation import advance_with_transition
 from formation_gnc.orbit.runge_kutta import COUPLING, STAGES, WEIGHTS
 
 Array = NDArray[np.float64]
+
+_VECTOR, _MATRIX = float64[::1], float64[:, ::1]
+"""Of arrays that are changed."""
 
 _SENSORS = NumbaArray(int64, 1, "A", readonly=True)
 
@@ -113,43 +117,39 @@ def coast(state: Array, acceleration: Array, duration: float, substeps: int) -> 
 
 
 @kernel((ANY_VECTOR, ANY_VECTOR, float64, int64, float64, float64))
-def follow(
+def can_be_there(
     chief: Array, told: Array, tick: float, substeps: int, distance: float, speed: float
-) -> tuple[Array, bool]:
-    """The chief a tick later: as told, if that is where it can have flown; else as the model flies it.
+) -> bool:
+    """Whether a tick later the chief can be where it is told to be.
 
     Args:
         chief: inertial state at the start of the tick, (6,), m and m/s.
         told: what the ephemeris gives for its end, (6,).
         tick: s.
         substeps: integration steps in the tick.
-        distance: between both, m, above which the ephemeris is not believed.
+        distance: from where the model flies it, m, above which the ephemeris is not believed.
         speed: the same of the velocities, m/s.
-
-    Returns:
-        The state, (6,), and whether it is the one told.
     """
     flown = _coast(chief, 0.0, 0.0, 0.0, tick, substeps)
     apart, faster = 0.0, 0.0
     for c in range(3):
         apart += (told[c] - flown[c]) ** 2
         faster += (told[3 + c] - flown[3 + c]) ** 2
-    if apart <= distance * distance and faster <= speed * speed:  # false for what is not a number
-        return told.copy(), True
-    return flown, False
+    return apart <= distance * distance and faster <= speed * speed  # false for what is not a number
 
 
-@kernel((ANY_VECTOR, ANY_VECTOR, ANY_VECTOR, ANY_MATRIX, ANY_MATRIX, ANY_VECTOR, float64, int64))
+@kernel((_VECTOR, _MATRIX, _MATRIX, ANY_VECTOR, ANY_VECTOR, ANY_MATRIX, ANY_VECTOR, float64, int64))
 def fly(
-    chief: Array,
-    next_chief: Array,
     state: Array,
     covariance: Array,
+    transition: Array,
+    chief: Array,
+    next_chief: Array,
     noise: Array,
     acceleration: Array,
     tick: float,
     substeps: int,
-) -> tuple[Array, Array, Array]:
+) -> None:
     """One prediction of the extended Kalman filter, exact in the motion.
 
     The deputy flies in the inertial frame beside the chief, so that neither a circular chief nor a small
@@ -158,17 +158,15 @@ def fly(
     force that it leaves out (Sun, Moon, drag) then counts only as far as it differs between the two.
 
     Args:
+        state: relative state, (6,), at the start, to become that at the end.
+        covariance: of it, (6, 6), alike.
+        transition: to become the transition matrix (6, 6).
         chief: inertial state at the start, (6,), m and m/s.
         next_chief: at the end.
-        state: relative state at the start, (6,).
-        covariance: of it, (6, 6).
         noise: what the process adds, (6, 6).
         acceleration: by thrust, along the Hill axes at the start, held in inertial space, (3,), m/s^2.
         tick: s.
         substeps: integration steps in the tick.
-
-    Returns:
-        Relative state, its covariance, and the transition matrix (6, 6).
     """
     axes, rate = hill_frame(chief)
     thrust = np.empty(3)
@@ -176,12 +174,10 @@ def fly(
         thrust[c] = acceleration[0] * axes[0, c] + acceleration[1] * axes[1, c] + acceleration[2] * axes[2, c]
     deputy, flight = advance_with_transition(to_inertial(axes, rate, chief, state), thrust, tick, substeps)
     next_axes, next_rate = hill_frame(next_chief)
-    transition = _product(_product(_transform(next_axes, next_rate), flight), _transform_inverse(axes, rate))
-    return (
-        to_relative(next_axes, next_rate, _coast(chief, 0.0, 0.0, 0.0, tick, substeps), deputy),
-        _congruence(transition, covariance, noise),
-        transition,
-    )
+    flight = _product(_product(_transform(next_axes, next_rate), flight), _transform_inverse(axes, rate))
+    transition[:] = flight
+    covariance[:] = _congruence(flight, covariance, noise)
+    state[:] = to_relative(next_axes, next_rate, _coast(chief, 0.0, 0.0, 0.0, tick, substeps), deputy)
 
 
 @kernel((ANY_VECTOR, ANY_VECTOR, ANY_MATRIX, ANY_VECTOR, float64, int64))
@@ -285,12 +281,10 @@ def relative_to(chief: Array, state: Array, other: Array) -> Array:
     return to_relative(other_axes, other_rate, other, to_inertial(axes, rate, chief, state))
 
 
-@kernel((ANY_MATRIX, ANY_MATRIX, ANY_VECTOR, float64))
-def carry(transition: Array, since: Array, direction: Array, mean_motion: float) -> tuple[Array, Array]:
-    """Compose a transition (6, 6) with an earlier one, and move a direction along with it.
-
-    Directions (6,) are relative states with their rates divided by the mean motion (rad/s), of unit length.
-    """
+@kernel((_VECTOR, ANY_MATRIX, float64))
+def carry(direction: Array, transition: Array, mean_motion: float) -> None:
+    """Move a direction (6,), a relative state of unit length with its rates divided by the mean motion
+    (rad/s), along with a transition (6, 6)."""
     moved = np.zeros(6)
     for i in range(6):
         for k in range(3):
@@ -301,24 +295,26 @@ def carry(transition: Array, since: Array, direction: Array, mean_motion: float)
     for i in range(3):
         moved[3 + i] /= mean_motion
         square += moved[i] * moved[i] + moved[3 + i] * moved[3 + i]
-    if square > 0.0:
-        for i in range(6):
-            moved[i] /= sqrt(square)
-    return _product(transition, since), moved
+    for i in range(6):
+        direction[i] = moved[i] / sqrt(square) if square > 0.0 else moved[i]
 
 
-@kernel((ANY_MATRIX, ANY_MATRIX, ANY_MATRIX, ANY_VECTOR))
-def inform(total: Array, jacobian: Array, since: Array, variance: Array) -> Array:
-    """A Gramian (6, 6) with (H Phi)' R^-1 (H Phi) added: H (k, 6), variances (k,)."""
+@kernel((_MATRIX, ANY_MATRIX))
+def compose(since: Array, transition: Array) -> None:
+    """Let a transition (6, 6) follow those `since` a time, (6, 6)."""
+    since[:] = _product(transition, since)
+
+
+@kernel((_MATRIX, ANY_MATRIX, ANY_MATRIX, ANY_VECTOR))
+def inform(total: Array, jacobian: Array, since: Array, variance: Array) -> None:
+    """Add (H Phi)' R^-1 (H Phi) to a Gramian (6, 6): H (k, 6), variances (k,)."""
     rows = _product(jacobian, since)
-    out = np.empty((6, 6))
     for i in range(6):
         for j in range(i + 1):
             added = total[i, j]
             for row in range(rows.shape[0]):
                 added += rows[row, i] * rows[row, j] / variance[row]
-            out[i, j] = out[j, i] = added
-    return out
+            total[i, j] = total[j, i] = added
 
 
 @kernel((ANY_MATRIX, ANY_MATRIX, ANY_VECTOR))
@@ -343,35 +339,33 @@ def sound(state: Array, covariance: Array) -> bool:
     return total == 0.0
 
 
-@kernel((ANY_MATRIX,))
-def settle(covariance: Array) -> tuple[Array, bool]:
-    """A covariance made symmetric, and positive definite if rounding has taken that from it.
+@kernel((_MATRIX,))
+def settle(covariance: Array) -> bool:
+    """Make a covariance symmetric, and positive definite if rounding has taken that from it.
 
-    Returns:
-        The covariance, and whether it had to be repaired. Not a number stays what it is.
+    Returns whether it had to be repaired. Not a number stays what it is.
     """
     size = covariance.shape[0]
-    out = np.empty((size, size))
     for i in range(size):
-        for j in range(size):
-            out[i, j] = 0.5 * (covariance[i, j] + covariance[j, i])
+        for j in range(i + 1):
+            covariance[i, j] = covariance[j, i] = 0.5 * (covariance[i, j] + covariance[j, i])
     least = 1e-30
     for i in range(size):
-        least = max(least, 1e-24 * out[i, i])
+        least = max(least, 1e-24 * covariance[i, i])
     repaired = False
     scale = np.empty(size)
     for i in range(size):
-        if out[i, i] < least:
-            out[i, i] = least
+        if covariance[i, i] < least:
+            covariance[i, i] = least
             repaired = True
-        scale[i] = sqrt(out[i, i])
+        scale[i] = sqrt(covariance[i, i])
     factor = np.empty((size, size))
     added = 1e-12
     for _ in range(40):
         sound = True
         for j in range(size):
             for i in range(j, size):
-                total = out[i, j] / (scale[i] * scale[j])
+                total = covariance[i, j] / (scale[i] * scale[j])
                 for k in range(j):
                     total -= factor[i, k] * factor[j, k]
                 if i == j:
@@ -383,6 +377,6 @@ def settle(covariance: Array) -> tuple[Array, bool]:
             break
         repaired = True
         for i in range(size):
-            out[i, i] += added * scale[i] * scale[i]
+            covariance[i, i] += added * scale[i] * scale[i]
         added *= 4.0
-    return out, repaired
+    return repaired

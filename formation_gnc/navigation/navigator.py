@@ -541,11 +541,10 @@ class Navigator(Part[NavigationParameters, Design]):
 
 
 def _follow(chief: Vector, told: Vector, over: Stride) -> tuple[Vector, bool]:
-    """The chief after a stride: as told if that is credible, and whether it is."""
-    followed: tuple[Vector, bool] = kernels.follow(
-        chief, told, over.seconds, over.substeps, over.distance, over.speed
-    )
-    return followed
+    """The chief after a stride: as told if it can be there, else as the model has it; and whether it can."""
+    if kernels.can_be_there(chief, told, over.seconds, over.substeps, over.distance, over.speed):
+        return told, True
+    return kernels.coast(chief, _NO_ACCELERATION, over.seconds, over.substeps), False
 
 
 def _can_weigh(mass: float) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 
 from formation_gnc.interface import Matrix, Vector
 from formation_gnc.navigation import kernels
-from formation_gnc.navigation.process import substeps
+from formation_gnc.navigation.process import Leg, NonlinearProcess, substeps
 from formation_gnc.orbit.frames import hill_transform
 
 BLIND = 1e-9
@@ -52,9 +52,8 @@ def gramian(
         seen = np.isfinite(jacobian).all(axis=1)
         total += information(jacobian[seen] @ since, weight[seen])
         later = kernels.coast(chief, _AT_REST, step, substeps(step))
-        state, _, transition = kernels.fly(
-            chief, later, state, _NO_NOISE, _NO_NOISE, _AT_REST, step, substeps(step)
-        )
+        leg = Leg(chief, later, _AT_REST, step, substeps(step))
+        state, _, transition = NonlinearProcess().predict(leg, state, _NO_NOISE, _NO_NOISE)
         chief, since = later, transition @ since
     return total
 
@@ -127,23 +126,23 @@ class Observability:
 
     def fly(self, transition: Matrix, duration: float) -> bool:
         """Move along; returns whether a window has ended, and with it what is said of the blind direction."""
-        self._since, self.direction = kernels.carry(
-            transition, self._since, self.direction, self._mean_motion
-        )
+        self.direction = self._moved(self.direction, transition)
+        kernels.compose(self._since, transition)
         self._elapsed += duration
         if self._elapsed < self._window:
             return False
         if self._told.any():
             blind = blind_directions(self._told, self._mean_motion)
-            self._set(np.array([self._moved(each) for each in blind]).reshape(-1, 6))
+            self._set(np.array([self._moved(each, self._since) for each in blind]).reshape(-1, 6))
         self._restart()
         return True
 
-    def _moved(self, direction: Vector) -> Vector:
-        """From the start of the window to its end."""
-        now: Vector = kernels.carry(self._since, self._since, direction, self._mean_motion)[1]
-        return now
+    def _moved(self, direction: Vector, transition: Matrix) -> Vector:
+        """A copy, since an estimate holds the old one."""
+        direction = direction.copy()
+        kernels.carry(direction, transition, self._mean_motion)
+        return direction
 
     def take(self, jacobian: Matrix, variance: Vector) -> None:
         """Count readings with Jacobian (k, 6) with respect to the present state."""
-        self._told = kernels.inform(self._told, jacobian, self._since, variance)
+        kernels.inform(self._told, jacobian, self._since, variance)

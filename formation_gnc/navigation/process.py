@@ -57,17 +57,19 @@ class NonlinearProcess(ProcessModel):
         self, leg: Leg, state: Vector, covariance: Matrix, noise: Matrix
     ) -> tuple[Vector, Matrix, Matrix]:
         """In one kernel, the transition by the variational equations."""
-        moved: tuple[Vector, Matrix, Matrix] = kernels.fly(
-            leg.chief,
-            leg.next_chief,
+        state, covariance, transition = state.copy(), covariance.copy(), np.empty((6, 6))
+        kernels.fly(
             state,
             covariance,
+            transition,
+            leg.chief,
+            leg.next_chief,
             noise,
             leg.acceleration,
             leg.duration,
             leg.substeps,
         )
-        return moved
+        return state, covariance, transition
 
     def move(self, leg: Leg, points: Matrix) -> Matrix:
         """Each in the inertial frame."""

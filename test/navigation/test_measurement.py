@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from formation_gnc.interface import Sensor, Vector
 from formation_gnc.navigation import kernels
 from formation_gnc.navigation.measurement import Readings, Track, pseudo_jacobian, pseudo_measurements
-from formation_gnc.navigation.process import Leg, substeps
+from formation_gnc.navigation.process import Leg, NonlinearProcess, substeps
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import (
     hill_transform,
@@ -106,9 +106,9 @@ def test_a_prediction_is_the_inertial_flight_of_both_satellites(
 ) -> None:
     tick = 10.0
     later = kernels.coast(chief, AT_REST, tick, 1)
-    np.testing.assert_array_equal(later, kernels.follow(chief, later, tick, 1, 1.0, 1.0)[0])
     covariance, noise = np.diag([1.0, 2.0, 3.0, 1e-6, 2e-6, 3e-6]), np.eye(6) * 1e-9
-    state, spread, transition = kernels.fly(chief, later, relative, covariance, noise, acceleration, tick, 1)
+    leg = Leg(chief, later, acceleration, tick, 1)
+    state, spread, transition = NonlinearProcess().predict(leg, relative, covariance, noise)
     inertial = acceleration @ np.array([hill_transform(chief)[row, :3] for row in range(3)])
     deputy, flight = advance_with_transition(inertial_from_relative(chief, relative), inertial, tick, 1)
     np.testing.assert_allclose(state, relative_from_inertial(later, deputy), rtol=1e-13, atol=5e-8)
@@ -131,8 +131,9 @@ def test_a_late_reading_is_expected_where_the_deputy_was_when_it_was_taken(
     for _ in range(6):
         before = places[-1][0]
         after = kernels.coast(before, AT_REST, tick, 1)
-        track.add(Leg(before, after, force, tick, 1))
-        state, _, _ = kernels.fly(before, after, state, np.zeros((6, 6)), np.zeros((6, 6)), force, tick, 1)
+        leg = Leg(before, after, force, tick, 1)
+        track.add(leg)
+        state, _, _ = NonlinearProcess().predict(leg, state, np.zeros((6, 6)), np.zeros((6, 6)))
         places.append((after, inertial_from_relative(after, state)))
     late = readings(places[-1][0], np.zeros(5), age, track)
     expected, jacobian = late.expected(state)
