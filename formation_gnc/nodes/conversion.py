@@ -5,13 +5,11 @@ number aligned to its size. By way of rclpy's message objects the same bytes tak
 """
 
 import struct
-from collections.abc import Callable, Iterator
 from dataclasses import fields
 from functools import cache
 from importlib import import_module
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import Any, get_args, get_origin, get_type_hints, override
 
-import numpy as np
 from formation_gnc_msgs import msg as messages
 from rclpy.serialization import deserialize_message, serialize_message
 from rosidl_parser.definition import Array, BasicType, NamespacedType, UnboundedString
@@ -50,111 +48,61 @@ def message_class(type_name: str) -> Any:
 def to_cdr(record: Any) -> bytes:
     """The message with the contents of a record, header included; gaps between numbers are zero."""
     kind: Any = type(record)
-    return _codec(kind).encode(record)
+    return _message(kind).encode(record)
 
 
 def from_cdr[T](record_type: type[T], data: bytes) -> T:
     """The record with the contents of a message; raises ConfigurationError when the bytes do not fit it."""
     kind: Any = record_type
-    record: T = _codec(kind).decode(data)
+    record: T = _message(kind).decode(data)
     return record
 
 
-class _Codec:
-    """How a record becomes its message, and back; what it lacks of the message is passed over."""
+class _Message(cdr.Codec):
+    """A record's message, as the installed message class defines it."""
 
     def __init__(self, record_type: type[Any]) -> None:
         """Look at the fields of both."""
-        self._type, self._message_type = record_type, message_type(record_type)
+        self._type = message_type(record_type)
         hints = get_type_hints(record_type)
         shapes = {field.name: field.metadata.get("shape") for field in fields(record_type)}
-        slots = zip(
-            self._message_type.get_fields_and_field_types(), self._message_type.SLOT_TYPES, strict=True
+        slots = zip(self._type.get_fields_and_field_types(), self._type.SLOT_TYPES, strict=True)
+        super().__init__(
+            record_type,
+            [
+                cdr.header("time", FRAME_IDS.get(record_type, ""))
+                if name == "header"
+                else _field(name, slot, hints.get(name), shapes.get(name))
+                for name, slot in slots
+            ],
         )
-        self._fields: list[tuple[str, cdr.Kind]] = []
-        for name, slot in slots:
-            if name == "header":
-                self._fields.append(("time", cdr.Header(FRAME_IDS.get(record_type, ""), cdr.Text())))
-            else:
-                self._fields.append((name, _kind(slot, hints.get(name), shapes.get(name))))
-        *_, last = (index for index, (name, _) in enumerate(self._fields) if name in hints)
-        self._wanted = [(name, kind, name in hints) for name, kind in self._fields[: last + 1]]
-        self._drawn: dict[tuple[int, ...], cdr.Layout] = {}
-        self._met: dict[int, cdr.Layout] = {}
 
-    def encode(self, record: Any) -> bytes:
-        """The message with a record's contents."""
-        values, counts = list[Any]([cdr.ENCAPSULATION]), list[int]()
-        self.write(record, values, counts)
-        layout = self._drawn.get(tuple(counts))
-        if layout is None:
-            told = iter(counts)
-            layout = self._drawn[tuple(counts)] = self._lay_out(lambda place: next(told))
-        return layout.whole.pack(*values)
-
-    def decode(self, data: bytes) -> Any:
-        """The record with a message's contents."""
-        if data[:2] != cdr.ENCAPSULATION[:2]:  # from a machine that writes its numbers the other way round
-            data = serialize_message(deserialize_message(data, self._message_type))
-        layout = self._met.get(len(data))
+    @override
+    def meet(self, data: bytes) -> bytes:
+        name, size = self._type.__name__, len(data)
         try:
-            if layout is None or layout.probe.unpack_from(data) != layout.counts:
-                layout = self._lay_out(lambda place: _count_at(data, place))
-                self._met[len(data)] = layout
-            values = iter(layout.whole.unpack_from(data))
-        except struct.error as error:
-            name = self._message_type.__name__
-            raise ConfigurationError(f"{len(data)} bytes do not fit message type {name}: {error}") from None
-        next(values)
-        return self.read(values)
-
-    def _lay_out(self, tell: Callable[[int], int]) -> cdr.Layout:
-        pen = cdr.Pen(tell)
-        self.draw(pen)
-        return pen.layout()
-
-    def draw(self, pen: cdr.Pen) -> None:
-        """Lay all fields out."""
-        for _, kind in self._fields:
-            kind.draw(pen)
-
-    def write(self, record: Any, values: list[Any], counts: list[int]) -> None:
-        """Append the values of all fields."""
-        for name, kind in self._fields:
-            kind.write(getattr(record, name), values, counts)
-
-    def read(self, values: Iterator[Any]) -> Any:
-        """The record from the values of all fields."""
-        found = {}
-        for name, kind, is_wanted in self._wanted:
-            value = kind.read(values)
-            if is_wanted:
-                found[name] = value
-        return self._type(**found)
-
-
-def _count_at(data: bytes, place: int) -> int:
-    (count,) = cdr.COUNT.unpack_from(data, place)
-    if count > len(data):
-        raise struct.error(f"{count} of something")
-    return int(count)
+            if not data.startswith(cdr.LITTLE_ENDIAN):  # it writes its numbers the other way round
+                data = serialize_message(deserialize_message(data, self._type))
+            return super().meet(data)
+        except (struct.error, ValueError, RuntimeError) as error:
+            raise ConfigurationError(f"{size} bytes do not fit message type {name}: {error}") from None
 
 
 @cache
-def _codec(record_type: Any) -> _Codec:
-    return _Codec(record_type)
+def _message(record_type: Any) -> _Message:
+    return _Message(record_type)
 
 
-def _kind(slot: Any, hint: Any, shape: tuple[int, ...] | None) -> cdr.Kind:
-    """What a message's field is, as a record has it that annotates it with `hint`."""
+def _field(name: str, slot: Any, hint: Any, shape: tuple[int, ...] | None) -> cdr.Field:
+    """A message's field, for a record that annotates it with `hint`."""
     if isinstance(slot, UnboundedString):
-        return cdr.Text()
+        return cdr.text(name)
     if isinstance(slot, BasicType):
-        return cdr.Number(_CODES[slot.typename])
+        return cdr.number(name, _CODES[slot.typename])
     if isinstance(slot.value_type, NamespacedType):
         (item,) = get_args(hint)
-        return cdr.Records(_codec(item))
-    number = slot.size if isinstance(slot, Array) else None
-    is_list = get_origin(hint) is list
-    dtype = np.dtype(_CODES[slot.value_type.typename])
-    return cdr.Numbers(dtype, number, None if is_list else shape or (-1,))
+        return cdr.records(name, _message(item))
+    code, number = _CODES[slot.value_type.typename], slot.size if isinstance(slot, Array) else -1
+    if get_origin(hint) is list:
+        return cdr.sequence(name, code) if number < 0 else cdr.numbers(name, code, number)
+    return cdr.array(name, code, shape or (number,))

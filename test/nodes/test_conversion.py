@@ -1,5 +1,6 @@
 """Records become the bytes that ROS makes of their messages, and come back, bit for bit."""
 
+import contextlib
 import dataclasses
 import re
 import struct
@@ -128,9 +129,72 @@ def test_bytes_that_are_no_such_message_are_refused() -> None:
         from_cdr(interface.Truth, bytes(truth))
 
 
+@given(st.sampled_from(MESSAGES), st.data())
+def test_whatever_is_heard_is_read_or_refused(record: type, data: st.DataObject) -> None:
+    """Never is there another exception, whatever becomes of a message on its way."""
+    heard = bytearray(to_cdr(data.draw(records(record))))
+    places = st.integers(0, len(heard) - 1)
+    for place, byte in data.draw(st.dictionaries(places, st.integers(0, 255), max_size=3)).items():
+        heard[place] = byte
+    cut = data.draw(st.none() | places)
+    for kind in [record, interface.Neighbour] if record is interface.Estimate else [record]:
+        with contextlib.suppress(ConfigurationError):
+            from_cdr(kind, bytes(heard[:cut]))
+
+
+def test_bytes_behind_a_message_are_passed_over() -> None:
+    status = interface.Status(5, "lqr", np.ones(3), [True, False, True], iterations=2)
+    assert bits(from_cdr(interface.Status, to_cdr(status) + b"more")) == bits(status)
+
+
+def test_text_that_is_not_utf8_is_marked_as_such() -> None:
+    data = to_cdr(interface.Timing(5, "plant", 0.1))
+    assert (
+        from_cdr(interface.Timing, data.replace(b"plant", b"pl\xffnt")).node
+        == "pl\N{REPLACEMENT CHARACTER}nt"
+    )
+
+
+def test_text_without_its_zero_is_empty() -> None:
+    """As some who write DDS have it."""
+    data = struct.pack("<2s2x4id", b"\0\1", 5, 6, 0, 0, 0.1)
+    assert bits(from_cdr(interface.Timing, data)) == bits(interface.Timing(5_000_000_006, "", 0.1))
+
+
+@pytest.mark.parametrize(
+    "force",
+    [[1, 2, 3], np.array([1, 2, 3]), np.array([1, 2, 3], ">f8"), np.arange(6.0)[1:4], np.r_[3:0:-1.0][::-1]],
+)
+def test_numbers_of_any_type_and_layout_are_written(force: Any) -> None:
+    assert to_cdr(interface.Thrust(5, force)) == to_cdr(interface.Thrust(5, np.array([1.0, 2.0, 3.0])))
+
+
+def test_a_matrix_is_written_row_by_row() -> None:
+    rows = np.arange(12.0).reshape(2, 6)
+    target = interface.Target(5, "", np.zeros(6), 1.0, np.asfortranarray(rows))
+    assert from_cdr(interface.Target, to_cdr(target)).preview.tolist() == rows.tolist()
+
+
+def test_what_is_read_is_the_readers_own() -> None:
+    data = to_cdr(interface.Thrust(5, np.ones(3)))
+    mine, other = from_cdr(interface.Thrust, data), from_cdr(interface.Thrust, data)
+    mine.force[:] = 2.0
+    assert other.force.tolist() == from_cdr(interface.Thrust, data).force.tolist() == [1.0, 1.0, 1.0]
+
+
 def test_a_field_of_the_wrong_length_is_not_written() -> None:
     with pytest.raises(ValueError, match="2 numbers where the message has 3"):
         to_cdr(interface.Thrust(0, np.ones(2)))
+    with pytest.raises(ValueError, match="4 numbers where the message has 3"):
+        to_cdr(interface.Status(0, "lqr", np.ones(3), [True] * 4))
+    with pytest.raises(ValueError, match="13 numbers in rows of 6"):
+        to_cdr(interface.Target(0, "", np.zeros(6), 1.0, np.ones(13)))
+
+
+def test_rows_that_are_not_full_are_refused() -> None:
+    data = to_cdr(interface.Target(0, "", np.zeros(6), 1.0, np.ones((2, 6))))
+    with pytest.raises(ConfigurationError, match="13 numbers in rows of 6"):
+        from_cdr(interface.Target, data.replace(struct.pack("<I", 12), struct.pack("<I", 13)))
 
 
 @pytest.mark.parametrize("record", RECORDS)
