@@ -34,21 +34,27 @@ class Pen:
 
     def __init__(self, tell: Callable[[int], int], *, reads: bool) -> None:
         """Ask `tell` for the count that stands at a place (bytes); is it for a message that is read?"""
-        self._tell, self._place, self.reads = tell, BEGIN, reads
+        self._tell, self._place, self.reads, self.hides = tell, BEGIN, reads, False
         self.layout, self.counts = f"<{len(LITTLE_ENDIAN)}s{BEGIN - len(LITTLE_ENDIAN)}x", list[int]()
 
     def put(self, code: str, number: int = 1, form: str = "") -> None:
-        """Draw numbers of a kind that `struct` knows by `code`: one by one, or their bytes in a `form`."""
+        """Draw numbers of a kind that `struct` knows by `code`: one by one, or their bytes in a `form`.
+
+        While it `hides`, only room is left for them.
+        """
+        self._draw(code, number, "x" if self.hides else form)
+
+    def count(self) -> int:
+        """Draw a count of what follows, and say what it is."""
+        self._draw("I", 1, "")
+        self.counts.append(self._tell(self._place - COUNT.size))
+        return self.counts[-1]
+
+    def _draw(self, code: str, number: int, form: str) -> None:
         size = struct.calcsize(f"<{code}")
         gap = (BEGIN - self._place) % size if number else 0
         self.layout += f"{gap}x{number * size}{form}" if form else f"{gap}x{number}{code}"
         self._place += gap + number * size
-
-    def count(self) -> int:
-        """Draw a count of what follows, and say what it is."""
-        self.put("I")
-        self.counts.append(self._tell(self._place - COUNT.size))
-        return self.counts[-1]
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,13 +221,15 @@ class Codec:
     """The counts and all values of a record that is part of another."""
 
     def __init__(self, record_type: type[Any], of_message: list[Field]) -> None:
-        """Write the functions, from all fields of the message; those that a record lacks are passed over."""
+        """Write the functions, from all fields of the message."""
         self.record_type, self._fields = record_type, of_message
+        self._wanted = [each.name for each in fields(record_type)]
         self._met: dict[int, tuple[Callable[[bytes], Any], tuple[Any, ...]]] = {}  # by number of bytes
         made = {each.name: each.made for each in of_message}
-        self.variables = "".join(each.variables for each in of_message)
+        variables = (each.variables if each.name in self._wanted else each.given for each in of_message)
+        self.variables = "".join(variables)
         self.given = "".join(each.given for each in of_message)
-        self.made = ", ".join(made[field.name] for field in fields(record_type))
+        self.made = ", ".join(made[name] for name in self._wanted)
         source = _FORM.format(
             first="\n    ".join(each.first for each in of_message),
             taken="".join(each.taken for each in of_message),
@@ -238,8 +246,9 @@ class Codec:
         self.encode, self.decode, self.take = names["encode"], names["decode"], names["take"]
 
     def draw(self, pen: Pen) -> None:
-        """Lay all fields out."""
+        """Lay all fields out; those that the record lacks are not read, but their counts."""
         for each in self._fields:
+            pen.hides = pen.reads and each.name not in self._wanted
             each.draw(pen)
 
     def meet(self, data: bytes) -> bytes:

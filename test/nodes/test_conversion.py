@@ -137,7 +137,7 @@ def test_whatever_is_heard_is_read_or_refused(record: type, data: st.DataObject)
     for place, byte in data.draw(st.dictionaries(places, st.integers(0, 255), max_size=3)).items():
         heard[place] = byte
     cut = data.draw(st.none() | places)
-    for kind in [record, interface.Neighbour] if record is interface.Estimate else [record]:
+    for kind in [record, interface.NavigationState] if record is interface.Estimate else [record]:
         with contextlib.suppress(ConfigurationError):
             from_cdr(kind, bytes(heard[:cut]))
 
