@@ -48,13 +48,13 @@ def message_class(type_name: str) -> Any:
 def to_cdr(record: Any) -> bytes:
     """The message with the contents of a record, header included; gaps between numbers are zero."""
     kind: Any = type(record)
-    return _message(kind).encode(record)
+    return codec(kind).encode(record)
 
 
 def from_cdr[T](record_type: type[T], data: bytes) -> T:
     """The record with the contents of a message; raises ConfigurationError when the bytes do not fit it."""
     kind: Any = record_type
-    record: T = _message(kind).decode(data)
+    record: T = codec(kind).decode(data)
     return record
 
 
@@ -89,7 +89,8 @@ class _Message(cdr.Codec):
 
 
 @cache
-def _message(record_type: Any) -> _Message:
+def codec(record_type: Any) -> cdr.Codec:
+    """What encodes and decodes the records of a type, for who does it again and again."""
     return _Message(record_type)
 
 
@@ -101,7 +102,7 @@ def _field(name: str, slot: Any, hint: Any, shape: tuple[int, ...] | None) -> cd
         return cdr.number(name, _CODES[slot.typename])
     if isinstance(slot.value_type, NamespacedType):
         (item,) = get_args(hint)
-        return cdr.records(name, _message(item))
+        return cdr.records(name, codec(item))
     code, number = _CODES[slot.value_type.typename], slot.size if isinstance(slot, Array) else -1
     if get_origin(hint) is list:
         return cdr.sequence(name, code) if number < 0 else cdr.numbers(name, code, number)

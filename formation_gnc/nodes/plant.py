@@ -10,7 +10,7 @@ from rosgraph_msgs.msg import Clock
 
 from formation_gnc.interface import NANOSECONDS, Event, Measurement, Thrust, Truth, Vector
 from formation_gnc.nodes import topics
-from formation_gnc.nodes.conversion import from_cdr
+from formation_gnc.nodes.conversion import codec
 from formation_gnc.nodes.shell import ConfiguredNode, asked_to_stop, run
 from formation_gnc.plant.plant import Plant, PlantParameters
 
@@ -47,6 +47,7 @@ class PlantNode(ConfiguredNode):
         self._clock = Clock()
         self._tell_time = self.create_publisher(Clock, topics.CLOCK, topics.quality())
         self._diagnostics = self.create_publisher(DiagnosticArray, topics.DIAGNOSTICS, topics.quality())
+        self._read_thrust = codec(Thrust).decode
         for name in self.values.deputies:
             self.listen(Thrust, f"/{name}/{topics.THRUST}", partial(self._on_thrust, name))
         self.create_subscription(Clock, topics.RECORDED, self._on_recorded, topics.quality(topics.LATEST))
@@ -95,7 +96,7 @@ class PlantNode(ConfiguredNode):
         return self.plant.finished
 
     def _on_thrust(self, name: str, data: bytes) -> None:
-        thrust = from_cdr(Thrust, data)
+        thrust = self._read_thrust(data)
         if name in self._awaited and thrust.time == self.plant.time:
             self._awaited.discard(name)
             self._answered_before.add(name)

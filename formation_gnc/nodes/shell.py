@@ -33,7 +33,7 @@ from formation_gnc.errors import ConfigurationError
 from formation_gnc.interface import Event, Timing
 from formation_gnc.meeting import Meeting
 from formation_gnc.nodes import topics
-from formation_gnc.nodes.conversion import from_cdr, message_type, to_cdr
+from formation_gnc.nodes.conversion import codec, message_type
 from formation_gnc.nodes.wires import Wires
 from formation_gnc.orbit.propagation import ImpactError
 from formation_gnc.parameters import OWN_OF_ROS, Leaf, dump, leaves, load, read_yaml
@@ -99,7 +99,8 @@ class ConfiguredNode(Node):  # type: ignore[misc]
     def speak(self, record: type, topic: str) -> Callable[[Any], None]:
         """A function that publishes a record on a topic."""
         publisher = self.create_publisher(message_type(record), topic, topics.quality())
-        return lambda each: publisher.publish(to_cdr(each))
+        encode = codec(record).encode
+        return lambda each: publisher.publish(encode(each))
 
     def listen(self, record: type, topic: str, hear: Callable[[bytes], object]) -> None:
         """Let `hear` have the latest message of a record on a topic, as it came."""
@@ -215,9 +216,9 @@ class PartNode[P: Part[Any, Any]](ConfiguredNode):
         settled = next(iter(inputs)) in self._wires
         latest: dict[str, Callable[[], None]] = {}
 
-        def take(topic: str, read: Callable[[Any], Any], given: Any) -> None:
+        def take(topic: str, record: Any) -> None:
             started = perf_counter()
-            records = meeting.take(topic, read(given))
+            records = meeting.take(topic, record)
             if records is None:
                 return
             respond(*records)
@@ -225,13 +226,13 @@ class PartNode[P: Part[Any, Any]](ConfiguredNode):
             self._wires.deliver()
             self._finish_tick(records[0].time, spent)
 
-        def arrive(topic: str, read: Callable[[Any], Any], given: Any) -> None:
+        def arrive(topic: str, read: Callable[[bytes], Any], data: bytes) -> None:
             if settled:
-                take(topic, read, given)
+                take(topic, read(data))
                 return
             if not latest:
                 timer: Timer = self.create_timer(SETTLING, lambda: settle(timer))
-            latest[topic] = partial(take, topic, read, given)
+            latest[topic] = partial(take, topic, read(data))
 
         def settle(timer: Timer) -> None:
             nonlocal settled
@@ -242,9 +243,9 @@ class PartNode[P: Part[Any, Any]](ConfiguredNode):
 
         for topic, record in {**inputs, **others}.items():
             if topic in self._wires:
-                self._wires.hear(topic, partial(take, topic, lambda each: each))
+                self._wires.hear(topic, partial(take, topic))
             else:
-                self.listen(record, topic, partial(arrive, topic, partial(from_cdr, record)))
+                self.listen(record, topic, partial(arrive, topic, codec(record).decode))
 
     def _finish_tick(self, time: int, spent: float) -> None:
         """Publish what nobody waits for: the events, and the wall time (s) that the answer took."""
