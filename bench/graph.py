@@ -21,11 +21,11 @@ TICKS = 6000
 ROUNDS = 5
 
 
-def floor() -> float:
-    """Ticks per second of the do-nothing graph."""
+def floor(kind: str) -> float:
+    """Ticks per second of the do-nothing graph, of messages or of bytes."""
     with domain_coordinator.domain_id() as domain:
         environment = os.environ | {"ROS_DOMAIN_ID": str(domain)}
-        commands = [[sys.executable, "-m", "bench.floor", role, str(TICKS)] for role in ROLES]
+        commands = [[sys.executable, "-m", "bench.floor", kind, role, str(TICKS)] for role in ROLES]
         relays = [subprocess.Popen(command, env=environment) for command in commands[:-1]]
         try:
             answer = subprocess.run(commands[-1], env=environment, capture_output=True, text=True, check=True)
@@ -61,9 +61,10 @@ def in_process(record: bool) -> float:
 
 def run() -> list[Result]:
     """All figures of the graph."""
-    bare, flown, recorded, process, process_recorded = interleaved(
+    bare, bare_bytes, flown, recorded, process, process_recorded = interleaved(
         [
-            floor,
+            lambda: floor("messages"),
+            lambda: floor("bytes"),
             lambda: graph(False),
             lambda: graph(True),
             lambda: in_process(False),
@@ -73,6 +74,9 @@ def run() -> list[Result]:
     )
     return [
         Result("graph against a do-nothing floor", flown, bare, "ticks/s", flown / bare, ">= 0.7"),
+        Result(
+            "graph against the floor of bytes alone", flown, bare_bytes, "ticks/s", flown / bare_bytes, ""
+        ),
         Result("in-process against real time, 1 s tick", process, 1.0, "ticks/s", process, ">= 5000"),
         Result("graph with recorder against without", recorded, flown, "ticks/s", recorded / flown, ""),
         Result(
