@@ -14,7 +14,7 @@ class Meeting:
     The first topic sets the pace. A record of its that finds somebody without one at its last stamp does
     without them; else it waits. So one silent satellite costs the others one tick, and whoever speaks again
     is waited for from the next tick on, in whatever order their records come. Only the first `needed` topics
-    are never done without.
+    are never done without. Stamps that run backwards are those of a new run, and it begins as the first did.
     """
 
     def __init__(self, topics: Sequence[str], needed: int) -> None:
@@ -28,8 +28,12 @@ class Meeting:
     def take(self, topic: str, record: Any) -> list[Any] | None:
         """Take a record in; once per stamp, the records of all topics in order, None for who is lost."""
         time, heard = record.time, self._heard[topic]
+        if heard and time < _last(heard):
+            heard.clear()
         if topic == self._pace and time != self._now:
-            if self._dispensable and self._now is not None:
+            if self._now is not None and time < self._now:
+                self._begin_again(time)
+            elif self._dispensable and self._now is not None:
                 self._lost = frozenset(
                     each for each in self._dispensable if self._now not in self._heard[each]
                 )
@@ -45,3 +49,15 @@ class Meeting:
             return None
         self._answered = now
         return records
+
+    def _begin_again(self, time: int) -> None:
+        """Forget who was lost, and what was said by those who have not begun again yet."""
+        self._lost, self._answered = frozenset(), None
+        for told in self._heard.values():
+            if told and _last(told) > time:
+                told.clear()
+
+
+def _last(heard: OrderedDict[int, Any]) -> int:
+    last: int = next(reversed(heard))
+    return last

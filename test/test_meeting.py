@@ -14,6 +14,7 @@ OWN, SECOND, THIRD = "estimate", "/deputy2/estimate", "/deputy3/estimate"
 @dataclass
 class At:
     time: int
+    run: int = 1
 
 
 @pytest.fixture
@@ -67,6 +68,20 @@ def test_what_is_needed_is_never_done_without() -> None:
     pair = Meeting(("estimate", "target"), needed=2)
     assert answers(pair, ("estimate", 10), ("estimate", 20), ("estimate", 30)) == []
     assert answers(pair, ("target", 30)) == [[30, 30]]
+
+
+@pytest.mark.parametrize("order", list(permutations((OWN, SECOND, THIRD))))
+@pytest.mark.parametrize("last", [{OWN, SECOND, THIRD}, {OWN, SECOND}, {OWN}])
+def test_a_new_run_hears_nothing_of_the_one_before(
+    fleet: Meeting, order: tuple[str, ...], last: set[str]
+) -> None:
+    """Wherever that one was left: with everybody there, with one lost, or with none at its last stamp."""
+    for time in (0, 10, 20):
+        for topic in order if time < 20 else sorted(last):
+            fleet.take(topic, At(time))
+    for time in (0, 10, 20, 30):
+        now = At(time, run=2)
+        assert [fleet.take(topic, now) for topic in order] == [None, None, [now] * 3]
 
 
 def test_wires_hand_on_in_the_order_of_speech_and_to_the_last_listener_first() -> None:
