@@ -340,11 +340,9 @@ def sound(state: Array, covariance: Array) -> bool:
 
 
 @kernel((_MATRIX,))
-def settle(covariance: Array) -> bool:
-    """Make a covariance symmetric, and positive definite if rounding has taken that from it.
-
-    Returns whether it had to be repaired. Not a number stays what it is.
-    """
+def settle(covariance: Array) -> None:
+    """Make a covariance symmetric, and positive definite if rounding has taken that from it; what is not a
+    number stays so."""
     size = covariance.shape[0]
     for i in range(size):
         for j in range(i + 1):
@@ -352,12 +350,10 @@ def settle(covariance: Array) -> bool:
     least = 1e-30
     for i in range(size):
         least = max(least, 1e-24 * covariance[i, i])
-    repaired = False
     scale = np.empty(size)
     for i in range(size):
         if covariance[i, i] < least:
             covariance[i, i] = least
-            repaired = True
         scale[i] = sqrt(covariance[i, i])
     factor = np.empty((size, size))
     added = 1e-12
@@ -374,9 +370,7 @@ def settle(covariance: Array) -> bool:
                 else:
                     factor[i, j] = total / factor[j, j]
         if sound:
-            break
-        repaired = True
+            return
         for i in range(size):
             covariance[i, i] += added * scale[i] * scale[i]
         added *= 4.0
-    return repaired
