@@ -1,7 +1,8 @@
 """What the parts of the system hand to one another at a tick.
 
 Each class mirrors the message of the same name in ``msg_defs/``, where units and frames are given; `time` is
-the message's stamp in nanoseconds of simulated time. The core speaks these, the ROS shell translates them.
+the message's stamp in nanoseconds of simulated time; `NavigationState` is read from the message of an
+`Estimate`, of which it is a part. The core speaks these, the ROS shell translates them.
 """
 
 from dataclasses import dataclass, field
@@ -76,7 +77,7 @@ class Measurement:
 
 @dataclass(slots=True)
 class NavigationState:
-    """What guidance and control use of an estimate: the beginning of its message."""
+    """What guidance and control use of an estimate, and all that they read of its message."""
 
     time: int
     relative_state: Vector  # (6,)

@@ -214,7 +214,7 @@ class Codec:
     """How the records of one type become messages, and back."""
 
     encode: Callable[[Any], bytes]
-    """The message with a record's contents."""
+    """The message with the contents of a record that lacks nothing of it."""
     decode: Callable[[bytes], Any]
     """The record with a message's contents; raises what `meet` does."""
     take: Callable[[Any], tuple[tuple[int, ...], tuple[Any, ...]]]
