@@ -194,8 +194,11 @@ def test_another_seed_gives_other_noise_on_the_same_start() -> None:
     assert not np.isin(one["/deputy1/measurement"][0].fix, other["/deputy1/measurement"][0].fix).any()
 
 
-def test_records_do_not_change_after_they_were_handed_over() -> None:
-    run, kept = Run(load_scenario("leader_follower")), []
+@pytest.mark.parametrize("navigation", [{}, {"filter": "ukf"}, {"process_model": "hill"}])
+def test_records_do_not_change_after_they_were_handed_over(navigation: dict[str, Any]) -> None:
+    """Whichever arithmetic works in place, and when a window of observability ends."""
+    overrides = {"/**/navigation": {"observability_window": 10.0, **navigation}}
+    run, kept = Run(load_scenario("leader_follower", overrides)), []
     for _ in range(30):
         run.tick(lambda _, record: kept.append((record, to_cdr(record))))
     assert all(to_cdr(record) == before for record, before in kept)
