@@ -40,7 +40,8 @@ REPORT_TICKS = 64
 """Ticks after which progress is reported at the latest."""
 
 QUIET = 0.2
-"""Wall time (s) without a message after which a recorder that is told to stop believes that all has come."""
+"""Wall time (s) that a recorder which is told to stop listens without a message before it believes that all
+has come. It is listening that counts: one that gets no processor has heard nothing either."""
 
 
 @dataclass(frozen=True)
@@ -103,13 +104,14 @@ class RecorderNode(ConfiguredNode):
         self._settings: dict[str, dict[str, Any]] = {}
         self._heard: dict[str, int] = {}
         self._reported: int | None = None
-        self._last_message = monotonic()
+        self._is_quiet = False
         self.create_timer(LOOK_PERIOD, self._while_disk_lasts(self._look))
         self.create_timer(FLUSH_INTERVAL, self._while_disk_lasts(self.bag.flush))
 
     def is_quiet(self) -> bool:
-        """Whether nothing has come for a while."""
-        return monotonic() - self._last_message > QUIET
+        """Whether nothing has come since this was last asked; not before it is asked twice."""
+        quiet, self._is_quiet = self._is_quiet, True
+        return quiet
 
     def close(self) -> None:
         """Finish the bag."""
@@ -162,7 +164,7 @@ class RecorderNode(ConfiguredNode):
         paced = is_clock or topic == topics.TRUTH or topic.endswith(f"/{topics.MEASUREMENT}")
 
         def hear(data: bytes, stamp: int, number: int | None) -> None:
-            self._last_message = monotonic()
+            self._is_quiet = False
             count = self._counts[topic] = self._counts[topic] + 1
             if number is not None:
                 loss.take(number)
@@ -242,7 +244,7 @@ def record(node: RecorderNode) -> None:
     """Record until told to stop, and then until nothing more comes; raises OSError when the disk fails."""
     try:
         node.spin(lambda: asked_to_stop() or node.failure is not None)
-        node.spin(lambda: node.is_quiet() or node.failure is not None)
+        node.spin(lambda: node.is_quiet() or node.failure is not None, lambda: QUIET)
     finally:
         node.close()
     if node.failure is not None:

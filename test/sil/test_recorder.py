@@ -3,6 +3,8 @@
 import random
 import resource
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -100,6 +102,38 @@ def test_a_recorder_that_comes_late_knows_exactly_what_it_missed(desk: Desk) -> 
         assert lost[topic] + bag.topics[topic].count == ticks, topic
     assert bag.lost == sum(lost.values())
     assert "lost so far: " in recorder.text
+
+
+IDLER = """
+import signal
+import sys
+import time
+
+import rclpy
+from formation_gnc_msgs.msg import Event
+
+from formation_gnc.nodes import shell, topics
+from formation_gnc.nodes.recorder import QUIET, RecorderNode, record
+
+rclpy.init(args=sys.argv)
+recorder, user = RecorderNode(), rclpy.create_node("user")
+publisher = user.create_publisher(Event, topics.EVENTS, topics.quality())
+recorder.spin(lambda: publisher.get_subscription_count() > 0)
+for _ in range(50):
+    publisher.publish(Event())
+time.sleep(2.0 * QUIET)
+shell._stop_signals.append(signal.SIGINT)
+record(recorder)
+"""
+
+
+def test_a_recorder_that_got_no_processor_hears_what_is_waiting_before_it_stops(desk: Desk) -> None:
+    bag = desk.directory / "bag"
+    arguments = ["--ros-args", "--params-file", str(desk.parameters), "-p", f"bag:={bag}"]
+    subprocess.run(
+        [sys.executable, "-c", IDLER, *arguments], env=desk.environment, timeout=PATIENCE, check=True
+    )
+    assert Bag(bag).topics[topics.EVENTS].count == 50
 
 
 def test_a_snapshot_has_the_last_stretch_before_the_call(desk: Desk) -> None:
