@@ -90,6 +90,8 @@ class PlantNode(ConfiguredNode):
             self._awaited -= set(late)
         elif self._awaited and now - self._tick_started > self.values.deadline:
             self._say(f"waiting for the first answer of {', '.join(sorted(self._awaited))}")
+        elif self._recorder_lags() and now - self._tick_started > self.values.deadline:
+            self._say("waiting for /recorder, which lags behind")
         self._advance_if_ready()
         if now - self._reported > REPORT_PERIOD and not self.plant.finished:
             self._report("flying")
@@ -106,12 +108,7 @@ class PlantNode(ConfiguredNode):
     def _advance_if_ready(self) -> None:
         """Fly the tick if all have answered, the recorder keeps up and it is time."""
         plant = self.plant
-        if (
-            self._awaited
-            or plant.finished
-            or (self._recorder_is_there and plant.time > (self._recorded or 0) + self._recorder_lag)
-            or self._wait_for_pace() > 0.0
-        ):
+        if self._awaited or plant.finished or self._recorder_lags() or self._wait_for_pace() > 0.0:
             return
         tick, time = plant.tick, plant.time
         for name in plant.step(self._forces):
@@ -128,6 +125,9 @@ class PlantNode(ConfiguredNode):
             self._report("finished")
         else:
             self._publish_tick()
+
+    def _recorder_lags(self) -> bool:
+        return self._recorder_is_there and self.plant.time > (self._recorded or 0) + self._recorder_lag
 
     def _reason_of_miss(self, name: str) -> str:
         if name in self._forces:
@@ -157,10 +157,9 @@ class PlantNode(ConfiguredNode):
             self._advance_if_ready()
 
     def wait_for_recorder(self) -> bool:
-        """Whether a recorder is there that has not got the last tick yet."""
-        last = (self.plant.tick - 1) * self.values.tick_ns
+        """Whether a recorder is there that has not got all to the end yet."""
         return self.count_publishers(topics.RECORDED) > 0 and (
-            self._recorded is None or self._recorded < last
+            self._recorded is None or self._recorded < self.plant.time
         )
 
     def _wait_for_pace(self) -> float:

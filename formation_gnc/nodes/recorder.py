@@ -103,6 +103,7 @@ class RecorderNode(ConfiguredNode):
         self._asked: dict[str, float] = {}
         self._settings: dict[str, dict[str, Any]] = {}
         self._heard: dict[str, int] = {}
+        self._told = -1
         self._reported: int | None = None
         self._is_quiet = False
         self.create_timer(LOOK_PERIOD, self._while_disk_lasts(self._look))
@@ -158,7 +159,7 @@ class RecorderNode(ConfiguredNode):
         self.bag.add_topic(topic, type_name, topics.DEPTH)
         self._counts[topic] = 0
         loss = self._losses[topic] = LossCounter(lambda: self.count_publishers(topic), latched)
-        is_clock = topic == topics.CLOCK
+        is_clock, is_events = topic == topics.CLOCK, topic == topics.EVENTS
         namespace, _, name = topic.rpartition("/")
         node = next((f"{namespace}/{part}" for part, answer in topics.PARTS.items() if answer == name), "")
         paced = is_clock or topic == topics.TRUTH or topic.endswith(f"/{topics.MEASUREMENT}")
@@ -174,14 +175,19 @@ class RecorderNode(ConfiguredNode):
             self._write(topic, data, stamp, number or count)
             if paced:
                 self._heard[topic] = stamp
+            elif is_events:
+                self._told = stamp
             if is_clock and count % REPORT_TICKS == 0:
                 self._report()
 
         return self._while_disk_lasts(hear)
 
     def _report(self) -> None:
-        """Tell the plant up to which tick all that it publishes at every tick is recorded."""
-        recorded = min(self._heard.values(), default=-1)
+        """Tell the plant up to which stamp all that it publishes is recorded: tick by tick, then its end."""
+        stamps = set(self._heard.values())
+        recorded = min(stamps, default=-1)
+        if len(stamps) == 1 and self._told > recorded:  # nothing but the end is stamped after a tick
+            recorded = self._told
         if recorded != self._reported:
             self._reported = recorded
             progress = Clock()

@@ -1,6 +1,7 @@
 """Real node processes for software-in-the-loop tests, started as a user starts them."""
 
 import os
+import resource
 import shutil
 import signal
 import subprocess
@@ -30,6 +31,8 @@ GNC_TOPICS = (
 )
 PARTS = ("navigation", "guidance", "controller")
 PATIENCE = 90.0  # s of wall time, for a machine that is busy with other things
+
+resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # what is aborted to hear where it was leaves nothing else
 
 
 def wait_until(condition: Callable[[], bool], what: str, patience: float = PATIENCE) -> None:
@@ -94,7 +97,7 @@ class Desk:
     def __init__(self, directory: Path, domain: int) -> None:
         self.directory = directory
         self.domain = domain
-        self.environment = os.environ | {"ROS_DOMAIN_ID": str(domain)}
+        self.environment = os.environ | {"ROS_DOMAIN_ID": str(domain), "PYTHONFAULTHANDLER": "1"}
         self.parameters = find_scenario("leader_follower")
         self.terminals: list[Terminal] = []
 
@@ -124,10 +127,12 @@ class Desk:
         wait_until(lambda: all(each.process.poll() is not None for each in self.terminals), "the end")
 
     def clear(self) -> None:
+        """Leave nobody behind, and print what everybody said, which is shown if the test failed."""
         for terminal in self.terminals:
             if terminal.process.poll() is None:
-                terminal.signal(signal.SIGKILL)
+                terminal.signal(signal.SIGABRT)  # Python says where it was
                 terminal.wait()
+            print(f"--- {terminal.log.stem}\n{terminal.text}")
 
 
 @pytest.fixture
@@ -200,4 +205,4 @@ def sil(tmp_path: Path) -> Iterator[Callable[..., Sil]]:
         for pid in [*each.children().values(), each.process.pid]:
             with suppress(ProcessLookupError):
                 os.killpg(pid, signal.SIGKILL)
-        each.process.communicate()
+        print(*filter(None, each.process.communicate()), sep="\n")

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 import rclpy
+from formation_gnc_msgs.msg import Event
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rclpy.context import Context
@@ -77,7 +78,7 @@ def test_a_bag_says_all_of_its_run_and_nothing_of_the_machine(sil: Callable[...,
 
 
 def test_a_recorder_that_comes_late_knows_exactly_what_it_missed(desk: Desk) -> None:
-    ticks = 4 * topics.DEPTH  # at this pace it has 10 s to come in
+    ticks = 16 * topics.DEPTH  # at this pace it has 15 s to come in
     plant = desk.start("plant", duration=float(ticks), real_time_factor=500.0)
     parts = [desk.start(kind) for kind in PARTS]
     with user(desk) as (node, executor):
@@ -102,6 +103,54 @@ def test_a_recorder_that_comes_late_knows_exactly_what_it_missed(desk: Desk) -> 
         assert lost[topic] + bag.topics[topic].count == ticks, topic
     assert bag.lost == sum(lost.values())
     assert "lost so far: " in recorder.text
+
+
+def test_a_recorder_reports_the_end_of_the_flight(desk: Desk) -> None:
+    reported = []
+    with user(desk) as (node, executor):
+        node.create_subscription(
+            Clock, topics.RECORDED, lambda clock: reported.append(clock.clock.sec), topics.quality()
+        )
+        desk.start("recorder", bag=desk.directory / "bag")
+        plant = desk.start("plant", duration=20.0, wait_for_recorder=True)
+        for kind in PARTS:
+            desk.start(kind)
+
+        def ended() -> bool:
+            executor.spin_once(timeout_sec=0.0)
+            return plant.process.poll() is not None and bool(reported) and reported[-1] == 20
+
+        wait_until(ended, "the plant gone, and its end reported as recorded")
+    assert reported == sorted(reported)
+
+
+def test_the_plant_stays_until_a_recorder_has_its_end(desk: Desk) -> None:
+    with user(desk) as (node, executor):
+        told: list[str] = []
+        node.create_subscription(
+            Event, topics.EVENTS, lambda event: told.append(event.kind), topics.quality()
+        )
+        publisher = node.create_publisher(Clock, topics.RECORDED, topics.quality(topics.LATEST))
+
+        def record_up_to(stamp: int) -> None:
+            progress = Clock()
+            progress.clock.sec = stamp
+            publisher.publish(progress)
+
+        record_up_to(19)  # the stamp of the last tick
+        plant = desk.start("plant", duration=20.0)
+        for kind in PARTS:
+            desk.start(kind)
+
+        def ended() -> bool:
+            executor.spin_once(timeout_sec=0.0)
+            return "end" in told
+
+        wait_until(ended, "the end of the flight")
+        with pytest.raises(subprocess.TimeoutExpired):
+            plant.wait(2.0)
+        record_up_to(20)
+        assert plant.wait() == 0
 
 
 IDLER = """
