@@ -12,8 +12,10 @@ import pytest
 
 from formation_gnc.analysis.compare import gnc_topics
 from formation_gnc.cli import main
-from formation_gnc.interface import NANOSECONDS
+from formation_gnc.interface import NANOSECONDS, Timing
+from formation_gnc.nodes.conversion import codec
 from formation_gnc.nodes.record_in_process import reader
+from formation_gnc.nodes.topics import DEPTH
 from formation_gnc.recording.reader import Bag, identical, read
 from formation_gnc.recording.writer import BagWriter, TopicDefinition
 from formation_gnc.sil.replay import KINDS, nodes_of, parameters_of, replay
@@ -175,9 +177,13 @@ def test_swaps_by_schedule_and_by_hand_are_flown_again_at_their_tick(
 
 
 def rewritten(
-    bag: Bag, directory: Path, numbers: dict[tuple[str, int], int], metadata: dict[str, dict[str, str]]
+    bag: Bag,
+    directory: Path,
+    numbers: dict[tuple[str, int], int],
+    metadata: dict[str, dict[str, str]],
+    timings: dict[int, bytes] | None = None,
 ) -> Path:
-    """A copy with other numbers of messages by topic and stamp, 0 to leave one out, and more metadata."""
+    """A copy with other numbers of messages by topic and stamp, 0 to leave one out, and with more."""
     with BagWriter(directory, bag.metadata | metadata) as writer:
         for topic in bag.topics:
             schema, channel = bag.definition(topic)
@@ -188,6 +194,10 @@ def rewritten(
         for topic, data, stamp in bag.messages():
             if number := numbers.get((topic, stamp), 2):
                 writer.write(topic, data, stamp, number)
+        if timings:
+            writer.add_topic("/deputy1/timing", "formation_gnc_msgs/msg/Timing", DEPTH)
+        for stamp, timing in (timings or {}).items():
+            writer.write("/deputy1/timing", timing, stamp, 2)
     return directory
 
 
@@ -200,6 +210,21 @@ def test_an_answer_to_what_the_bag_lacks_is_taken_as_recorded_and_told(
     assert status == 0
     assert "2 answers as recorded" in capsys.readouterr().out
     assert again.topics["/deputy1/thrust"].count == Bag(flown).topics["/deputy1/thrust"].count
+
+
+def test_what_a_node_did_not_get_out_before_it_was_killed_is_not_missed(
+    flown: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, end = "/deputy1/status", 50 * NANOSECONDS
+    ticks = Bag(flown).arrays(status)["stamp_ns"].tolist()
+    timings = {stamp: codec(Timing).encode(Timing(stamp, "controller", 1e-4)) for stamp in ticks}
+    lost = {(status, end): 0}
+    whole = rewritten(Bag(flown), tmp_path / "whole", lost, {}, timings)
+    assert replayed(whole, tmp_path / "whole again", "--nodes", "controller")[0] == 1
+    assert f"differs: {status} at 50.000000000 s: only in the second bag" in capsys.readouterr().out
+    del timings[end]
+    killed = rewritten(Bag(flown), tmp_path / "killed", lost, {}, timings)
+    assert replayed(killed, tmp_path / "killed again", "--nodes", "controller")[0] == 0
 
 
 def test_a_node_started_again_flies_with_what_it_was_started_with_then_if_the_bag_has_it(

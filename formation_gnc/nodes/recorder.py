@@ -17,9 +17,10 @@ from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
-from formation_gnc.interface import NANOSECONDS
+from formation_gnc.interface import NANOSECONDS, Event
 from formation_gnc.mission import Mission
 from formation_gnc.nodes import topics
+from formation_gnc.nodes.conversion import codec
 from formation_gnc.nodes.raw_topics import Hear, RawTopics
 from formation_gnc.nodes.shell import ConfiguredNode, asked_to_stop, run
 from formation_gnc.parameters import parameter
@@ -103,7 +104,10 @@ class RecorderNode(ConfiguredNode):
         self._asked: dict[str, float] = {}
         self._settings: dict[str, dict[str, Any]] = {}
         self._heard: dict[str, int] = {}
+        self._answered: dict[str, dict[str, int]] = {}
+        self._missed: dict[str, int] = {}
         self._told = -1
+        self._read_event = codec(Event).decode
         self._reported: int | None = None
         self._is_quiet = False
         self.create_timer(LOOK_PERIOD, self._while_disk_lasts(self._look))
@@ -162,7 +166,11 @@ class RecorderNode(ConfiguredNode):
         is_clock, is_events = topic == topics.CLOCK, topic == topics.EVENTS
         namespace, _, name = topic.rpartition("/")
         node = next((f"{namespace}/{part}" for part, answer in topics.PARTS.items() if answer == name), "")
-        paced = is_clock or topic == topics.TRUTH or topic.endswith(f"/{topics.MEASUREMENT}")
+        stamps: dict[str, int] | None = None
+        if node:
+            stamps = self._answered.setdefault(namespace, {})
+        elif is_clock or topic == topics.TRUTH or name == topics.MEASUREMENT:
+            stamps = self._heard
 
         def hear(data: bytes, stamp: int, number: int | None) -> None:
             self._is_quiet = False
@@ -173,18 +181,27 @@ class RecorderNode(ConfiguredNode):
                 self._unknown[node] = parameters_record(node, stamp)
                 self._asked.pop(node, None)
             self._write(topic, data, stamp, number or count)
-            if paced:
-                self._heard[topic] = stamp
+            if is_clock and stamp < self._heard.get(topic, 0):
+                self._forget_progress()  # the plant was started again
+            if stamps is not None:
+                stamps[topic] = stamp
             elif is_events:
-                self._told = stamp
+                self._hear_event(data)
             if is_clock and count % REPORT_TICKS == 0:
                 self._report()
 
         return self._while_disk_lasts(hear)
 
     def _report(self) -> None:
-        """Tell the plant up to which stamp all that it publishes is recorded: tick by tick, then its end."""
+        """Tell the plant up to which stamp all is recorded: tick by tick, then its end.
+
+        That is what the plant publishes at every tick, and every deputy's answers or that it missed. What was
+        never heard of does not count: who comes late does not know what there was.
+        """
         stamps = set(self._heard.values())
+        for deputy, answers in self._answered.items():
+            if answers:
+                stamps.add(max(min(answers.values()), self._missed.get(deputy, -1)))
         recorded = min(stamps, default=-1)
         if len(stamps) == 1 and self._told > recorded:  # nothing but the end is stamped after a tick
             recorded = self._told
@@ -193,6 +210,17 @@ class RecorderNode(ConfiguredNode):
             progress = Clock()
             progress.clock.sec, progress.clock.nanosec = divmod(recorded, NANOSECONDS)
             self._progress.publish(progress)
+
+    def _hear_event(self, data: bytes) -> None:
+        event = self._read_event(data)
+        self._told = event.time
+        if event.kind == "miss":
+            self._missed[f"/{event.detail.split()[0]}"] = event.time
+
+    def _forget_progress(self) -> None:
+        self._told = -1
+        for stamps in (self._heard, self._missed, *self._answered.values()):
+            stamps.clear()
 
     def _say_what_is_lost(self) -> None:
         lost = {topic: each.lost for topic, each in self._losses.items() if each.lost}

@@ -255,10 +255,12 @@ def _fly_tick(
         started = perf_counter()
         records, events = part.tick(time, inputs, swaps.get(part.node, []))
         for name, record in zip(part.kind.outputs, records, strict=False):
-            if record is None:
+            topic = _sibling(part.node, name)
+            was_killed = is_timed and part.node not in timed  # in this tick, and this may not have got out
+            if record is None or (was_killed and topic not in tick):
                 continue
-            said[_sibling(part.node, name)] = record
-            sink(_sibling(part.node, name), record)
+            said[topic] = record
+            sink(topic, record)
         if is_timed:
             sink(timing, Timing(time, part.node.rpartition("/")[2], perf_counter() - started))
         for event in events:

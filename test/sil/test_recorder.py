@@ -153,6 +153,91 @@ def test_the_plant_stays_until_a_recorder_has_its_end(desk: Desk) -> None:
         assert plant.wait() == 0
 
 
+PROGRESS = """
+import sys
+import time
+
+import rclpy
+from formation_gnc_msgs import msg
+from rosgraph_msgs.msg import Clock
+
+from formation_gnc.nodes import topics
+from formation_gnc.nodes.recorder import RecorderNode
+
+rclpy.init(args=sys.argv)
+recorder, user = RecorderNode(), rclpy.create_node("user")
+recorder._knows_the_run = lambda: True  # there is no plant to ask
+reported, publishers = [], {}
+recorder.create_subscription(Clock, topics.RECORDED, lambda clock: reported.append(clock.clock.sec), 10)
+
+
+def tell(message_type, topic, stamp, **fields):
+    message = message_type(**fields)
+    (message.clock if message_type is Clock else message.header.stamp).sec = stamp
+    if topic not in publishers:
+        publishers[topic] = user.create_publisher(message_type, topic, topics.quality())
+    publishers[topic].publish(message)
+
+
+def plant(*stamps):
+    for stamp in stamps:
+        tell(msg.Measurement, "/deputy1/measurement", stamp)
+        tell(msg.Truth, "/truth", stamp)
+        tell(Clock, "/clock", stamp)
+
+
+def deputy(*stamps, kinds=(msg.Estimate, msg.Target, msg.Thrust)):
+    for stamp in stamps:
+        for kind in kinds:
+            tell(kind, f"/deputy1/{kind.__name__.lower()}", stamp)
+
+
+def event(kind, stamp, detail):
+    tell(msg.Event, "/events", stamp, kind=kind, detail=detail)
+
+
+def progress(expected):
+    end = time.monotonic() + 60.0
+    recorder.spin(lambda: reported[-1:] == [expected] or time.monotonic() > end)
+    recorder.spin(iter((False, True)).__next__, lambda: 0.5)  # it stays so
+    assert reported[-1] == expected, (reported, expected)
+
+
+plant(*range(11))
+progress(10)  # of answers it has never heard
+deputy(*range(5))
+progress(4)
+deputy(*range(5, 11), kinds=(msg.Estimate, msg.Thrust))
+progress(4)  # the thrust says that there was a target
+event("miss", 9, "deputy1 did not answer within 0.5 s: no thrust")
+progress(9)
+deputy(*range(5, 11), kinds=(msg.Target,))
+progress(10)
+event("end", 11, "11 ticks flown, 1 missed")
+progress(11)
+plant(0, 1)  # a new run
+progress(1)
+deputy(0)
+progress(0)
+event("end", 2, "2 ticks flown, 0 missed")
+deputy(1)
+progress(2)
+"""
+
+
+def test_the_recorder_reports_up_to_where_it_has_all_that_was_said(desk: Desk) -> None:
+    arguments = ["--ros-args", "--params-file", str(desk.parameters), "-p", f"bag:={desk.directory / 'bag'}"]
+    told = subprocess.run(
+        [sys.executable, "-c", PROGRESS, *arguments],
+        env=desk.environment,
+        timeout=2 * PATIENCE,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert told.returncode == 0, told.stderr
+
+
 IDLER = """
 import signal
 import sys
