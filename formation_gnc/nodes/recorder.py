@@ -167,10 +167,10 @@ class RecorderNode(ConfiguredNode):
         namespace, _, name = topic.rpartition("/")
         node = next((f"{namespace}/{part}" for part, answer in topics.PARTS.items() if answer == name), "")
         stamps: dict[str, int] | None = None
-        if node:
-            stamps = self._answered.setdefault(namespace, {})
-        elif is_clock or topic == topics.TRUTH or name == topics.MEASUREMENT:
+        if is_clock or topic == topics.TRUTH or name == topics.MEASUREMENT:
             stamps = self._heard
+        elif node:
+            stamps = self._answers_of(namespace)
 
         def hear(data: bytes, stamp: int, number: int | None) -> None:
             self._is_quiet = False
@@ -195,13 +195,13 @@ class RecorderNode(ConfiguredNode):
     def _report(self) -> None:
         """Tell the plant up to which stamp all is recorded: tick by tick, then its end.
 
-        That is what the plant publishes at every tick, and every deputy's answers or that it missed. What was
-        never heard of does not count: who comes late does not know what there was.
+        That is what the plant publishes at every tick, and every deputy's answers or that it missed.
         """
         stamps = set(self._heard.values())
-        for deputy, answers in self._answered.items():
-            if answers:
-                stamps.add(max(min(answers.values()), self._missed.get(deputy, -1)))
+        for topic in self._heard:
+            deputy, _, name = topic.rpartition("/")
+            if name == topics.MEASUREMENT:
+                stamps.add(max(min(self._answers_of(deputy).values()), self._missed.get(deputy, -1)))
         recorded = min(stamps, default=-1)
         if len(stamps) == 1 and self._told > recorded:  # nothing but the end is stamped after a tick
             recorded = self._told
@@ -211,6 +211,11 @@ class RecorderNode(ConfiguredNode):
             progress.clock.sec, progress.clock.nanosec = divmod(recorded, NANOSECONDS)
             self._progress.publish(progress)
 
+    def _answers_of(self, deputy: str) -> dict[str, int]:
+        """Latest stamps of a deputy's answers by topic, -1 for none."""
+        none = {f"{deputy}/{answer}": -1 for answer in topics.PARTS.values()}
+        return self._answered.setdefault(deputy, none)
+
     def _hear_event(self, data: bytes) -> None:
         event = self._read_event(data)
         self._told = event.time
@@ -219,8 +224,10 @@ class RecorderNode(ConfiguredNode):
 
     def _forget_progress(self) -> None:
         self._told = -1
-        for stamps in (self._heard, self._missed, *self._answered.values()):
-            stamps.clear()
+        self._heard.clear()
+        self._missed.clear()
+        for answers in self._answered.values():
+            answers.update(dict.fromkeys(answers, -1))
 
     def _say_what_is_lost(self) -> None:
         lost = {topic: each.lost for topic, each in self._losses.items() if each.lost}

@@ -43,6 +43,14 @@ def wait_until(condition: Callable[[], bool], what: str, patience: float = PATIE
         time.sleep(0.05)
 
 
+def has_messages(bag: Path, topic: str) -> bool:
+    """Whether messages of a topic are on disk."""
+    try:
+        return Bag(bag).topics[topic].count > 0
+    except (ConfigurationError, KeyError):  # not made yet, or not yet heard of
+        return False
+
+
 def set_parameter(domain: int, node: str, name: str, value: Any) -> tuple[bool, str]:
     """Set a parameter through the standard service, as `ros2 param set` does."""
     context = Context()
@@ -176,10 +184,7 @@ class Sil:
 
     def is_recorded(self) -> bool:
         """Whether messages of the flight are on disk."""
-        try:
-            return Bag(self.bag).topics["/truth"].count > 0
-        except (ConfigurationError, KeyError):  # not made yet, or not yet heard of
-            return False
+        return has_messages(self.bag, "/truth")
 
     def wait_for_flight(self) -> None:
         """Until the flight is being recorded."""

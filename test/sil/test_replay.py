@@ -19,7 +19,7 @@ from formation_gnc.cli import main
 from formation_gnc.recording.reader import Bag, identical
 from formation_gnc.sil.scenario import find_scenario
 
-from .conftest import GNC_TOPICS, PARTS, PATIENCE, Desk, Sil, wait_until
+from .conftest import GNC_TOPICS, PARTS, PATIENCE, Desk, Sil, has_messages, wait_until
 
 pytestmark = pytest.mark.sil
 
@@ -104,6 +104,9 @@ def test_the_replay_node_plays_in_step_with_real_nodes_to_the_same_bits(
         step = call(user, executor, Trigger, "/replay/step", Trigger.Request())
         assert step.success
         assert step.message == "played 0 s"
+        wait_until(
+            lambda: all(has_messages(bag, topic) for topic in GNC_TOPICS), "everybody joined to the recorder"
+        )
         assert (
             call(user, executor, SetBool, "/replay/pause", SetBool.Request(data=False)).message == "playing"
         )
