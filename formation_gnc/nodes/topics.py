@@ -6,7 +6,7 @@ DEPTH = 500
 """Messages that a writer keeps for who is late or slow, and that the recorder may lag behind.
 
 DDS repairs what gets lost by 256 messages at a time: many times more, from all writers at once to a recorder
-that joins on a busy machine, have held a flight up for minutes.
+that joins on a busy machine, have held a flight up for most of a minute.
 """
 
 CLOCK = "/clock"
