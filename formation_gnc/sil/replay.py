@@ -238,9 +238,9 @@ def _fly_tick(
         recorded = read(output, tick[output][-1]) if output in tick else None
         if _sibling(part.node, "measurement") not in tick:
             continue  # no tick of this deputy
-        # A node that was killed may have answered without the time to say how long it took.
-        answered = part.node in timed or not is_timed or recorded is not None
-        is_heard = part.heard(time, answered, recorded)
+        # A node that was killed in this tick may have answered without the time to say how long it took.
+        has_finished = part.node in timed or not is_timed
+        is_heard = part.heard(time, has_finished or recorded is not None, recorded)
         inputs = part.meet(there)  # even when it was silent: who is waited for next depends on it
         if inputs is None and recorded is not None:
             # A node that was killed may have reached others with what the recorder never got.
@@ -256,8 +256,7 @@ def _fly_tick(
         records, events = part.tick(time, inputs, swaps.get(part.node, []))
         for name, record in zip(part.kind.outputs, records, strict=False):
             topic = _sibling(part.node, name)
-            was_killed = is_timed and part.node not in timed  # in this tick, and this may not have got out
-            if record is None or (was_killed and topic not in tick):
+            if record is None or not (has_finished or topic in tick):
                 continue
             said[topic] = record
             sink(topic, record)

@@ -225,10 +225,11 @@ progress(2)
 """
 
 
-def test_the_recorder_reports_up_to_where_it_has_all_that_was_said(desk: Desk) -> None:
-    arguments = ["--ros-args", "--params-file", str(desk.parameters), "-p", f"bag:={desk.directory / 'bag'}"]
+def run_in_process_of_its_own(script: str, desk: Desk, bag: Path) -> None:
+    """Run a script that makes a recorder, since its node would stay in the domain of later tests."""
+    arguments = ["--ros-args", "--params-file", str(desk.parameters), "-p", f"bag:={bag}"]
     told = subprocess.run(
-        [sys.executable, "-c", PROGRESS, *arguments],
+        [sys.executable, "-c", script, *arguments],
         env=desk.environment,
         timeout=2 * PATIENCE,
         capture_output=True,
@@ -236,6 +237,10 @@ def test_the_recorder_reports_up_to_where_it_has_all_that_was_said(desk: Desk) -
         check=False,
     )
     assert told.returncode == 0, told.stderr
+
+
+def test_the_recorder_reports_up_to_where_it_has_all_that_was_said(desk: Desk) -> None:
+    run_in_process_of_its_own(PROGRESS, desk, desk.directory / "bag")
 
 
 IDLER = """
@@ -263,10 +268,7 @@ record(recorder)
 
 def test_a_recorder_that_got_no_processor_hears_what_is_waiting_before_it_stops(desk: Desk) -> None:
     bag = desk.directory / "bag"
-    arguments = ["--ros-args", "--params-file", str(desk.parameters), "-p", f"bag:={bag}"]
-    subprocess.run(
-        [sys.executable, "-c", IDLER, *arguments], env=desk.environment, timeout=PATIENCE, check=True
-    )
+    run_in_process_of_its_own(IDLER, desk, bag)
     assert Bag(bag).topics[topics.EVENTS].count == 50
 
 
