@@ -11,19 +11,20 @@ import piqp
 from numpy.typing import NDArray
 
 from bench.result import Result
+from formation_gnc.common import CommonParameters, Orbit
 from formation_gnc.control.controller import Controller, Vehicle
 from formation_gnc.control.mpc import SETTINGS, ModelPredictiveController, MpcParameters
 from formation_gnc.control.registry import ALGORITHMS, FINITE_HORIZONS
 from formation_gnc.control.weights import QuadraticWeights
-from formation_gnc.interface import NANOSECONDS, NavigationState, Target
-from formation_gnc.mission import Mission, Orbit
 from formation_gnc.orbit.elements import Elements, state_from_elements
+from formation_gnc.records import NavigationState, Target
 from formation_gnc.relative.hill import HillModel
+from formation_gnc.types import NANOSECONDS
 
 TICKS = 3000
 OFTEN = 20.0
 """s between the plans of a reconfiguration in 3000 s: more of them than a scenario has, for a percentile."""
-MISSION = Mission(Orbit(6978100.0), tick=1.0)
+MISSION = CommonParameters(Orbit(6978100.0), tick=1.0)
 VEHICLE = Vehicle(100.0, np.full(3, 0.01))
 CHIEF = state_from_elements(Elements(**vars(MISSION.chief)))
 START = np.array([40.0, -30.0, 20.0, 0.0, 0.0, 0.0])
@@ -134,9 +135,7 @@ def run() -> list[Result]:
     osqp_median = float(np.median(alone)) * micro
     results = [
         Result("MPC tick, 30 steps, 99th percentile against 1 ms", p99, 1000.0, "us", p99 / 1000.0, "<= 1"),
-        Result(
-            "MPC tick against bare OSQP, median", median, osqp_median, "us", median / osqp_median, "<= 1.5"
-        ),
+        Result("MPC tick against bare OSQP, median", median, osqp_median, "us", median / osqp_median, "<= 1.5"),
     ]
     for name, solver in others(matrices).items():
         theirs = float(np.median(solve_all(asked, solver))) * micro
@@ -155,7 +154,5 @@ def run() -> list[Result]:
         for kind, times in (("tick", own[~plans]), ("tick with a plan", own[plans])):
             for word, share in (("median", 50.0), ("p99", 99.0)) if times.size else ():
                 taken, theirs = (micro * float(np.percentile(each, share)) for each in (times, ticks))
-                results.append(
-                    Result(f"{label}: {kind}, {word} / MPC's", taken, theirs, "us", taken / theirs, "")
-                )
+                results.append(Result(f"{label}: {kind}, {word} / MPC's", taken, theirs, "us", taken / theirs, ""))
     return results

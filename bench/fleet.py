@@ -12,9 +12,9 @@ from time import process_time
 import yaml
 
 from bench.result import Result
-from formation_gnc.nodes.launcher import Report, fly_graph
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import SECTION, Scenario, find_scenario, load_scenario
+from formation_gnc.transport.launcher import Report, fly_graph
 
 SCENARIO = "projected_circle"
 CORES = 2

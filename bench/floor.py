@@ -20,8 +20,8 @@ from rclpy.serialization import serialize_message
 from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 
-from formation_gnc.nodes import topics
-from formation_gnc.nodes.shell import Executor
+from formation_gnc.transport import topics
+from formation_gnc.transport.node import Executor
 
 STAMP = struct.Struct("<i")
 """Seconds of a stamp, with which every message begins."""

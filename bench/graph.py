@@ -11,11 +11,11 @@ import domain_coordinator
 
 from bench.floor import ROLES
 from bench.result import Result, interleaved
-from formation_gnc.nodes.launcher import fly_graph
-from formation_gnc.nodes.record_in_process import InProcessRecorder
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
+from formation_gnc.transport.in_process_recorder import InProcessRecorder
+from formation_gnc.transport.launcher import fly_graph
 
 TICKS = 6000
 ROUNDS = 5
@@ -74,9 +74,7 @@ def run() -> list[Result]:
     )
     return [
         Result("graph against a do-nothing floor", flown, bare, "ticks/s", flown / bare, ">= 0.7"),
-        Result(
-            "graph against the floor of bytes alone", flown, bare_bytes, "ticks/s", flown / bare_bytes, ""
-        ),
+        Result("graph against the floor of bytes alone", flown, bare_bytes, "ticks/s", flown / bare_bytes, ""),
         Result("in-process against real time, 1 s tick", process, 1.0, "ticks/s", process, ">= 5000"),
         Result("graph with recorder against without", recorded, flown, "ticks/s", recorded / flown, ""),
         Result(

@@ -10,13 +10,13 @@ from filterpy.kalman import ExtendedKalmanFilter
 from numpy.typing import NDArray
 
 from bench.result import Result
-from formation_gnc.mission import Orbit
+from formation_gnc.common import Orbit
 from formation_gnc.navigation import kernels
 from formation_gnc.navigation.filters import ExtendedFilter
-from formation_gnc.navigation.measurement import Readings, Track
-from formation_gnc.navigation.navigator import NavigationParameters
-from formation_gnc.navigation.process import Leg, NonlinearProcess, process_noise
-from formation_gnc.navigation.rehearsal import navigator, rehearse
+from formation_gnc.navigation.measurement import Readings, StateHistory
+from formation_gnc.navigation.navigation_filter import NavigationParameters
+from formation_gnc.navigation.process import Interval, NonlinearProcess, process_noise
+from formation_gnc.sil.monte_carlo import navigator, simulate_measurements
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ ROUNDS = 25
 class _Bare(ExtendedKalmanFilter):  # type: ignore[misc]
     """FilterPy's filter as a user writes it down: a nonlinear prediction, and its own covariance."""
 
-    def fly(self, leg: Leg, nothing: Array) -> None:
+    def fly(self, leg: Interval, nothing: Array) -> None:
         self.moved, _, self.F = NonlinearProcess().predict(leg, self.x, self.P, nothing)
         self.predict()
 
@@ -42,18 +42,15 @@ def run() -> list[Result]:
     observability and the estimate.
     """
     parameters = NavigationParameters(chief=Orbit(6978100.0, inclination=radians(50.0)), tick=1.0)
-    samples = [each.measurement for each in rehearse(parameters, 600, np.random.default_rng(1))]
+    samples = [each.measurement for each in simulate_measurements(parameters, 600, np.random.default_rng(1))]
     every_tenth = [
-        each if index % 10 == 0 else replace(each, sensor=[], reading=[], age=[])
-        for index, each in enumerate(samples)
+        each if index % 10 == 0 else replace(each, sensor=[], reading=[], age=[]) for index, each in enumerate(samples)
     ]
     noise, nothing = process_noise(1e-14, 1.0), np.zeros((6, 6))
     covariance = np.diag(np.repeat([0.25, 2.5e-7], 3))
     sensors, variance = np.array([0, 1, 2]), np.array([25.0, 1e-4, 1e-12])
-    process, track = NonlinearProcess(), Track(60)
-    legs = [
-        Leg(one.chief_state, other.chief_state, np.zeros(3), 1.0, 1) for one, other in pairwise(every_tenth)
-    ]
+    process, track = NonlinearProcess(), StateHistory(60)
+    legs = [Interval(one.chief_state, other.chief_state, np.zeros(3), 1.0, 1) for one, other in pairwise(every_tenth)]
 
     def bare() -> Array:
         filter = _Bare(6, 3)

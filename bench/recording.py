@@ -13,12 +13,12 @@ from mcap.writer import CompressionType, Writer
 from mcap_ros2.decoder import DecoderFactory
 
 from bench.result import Result, interleaved
-from formation_gnc.interface import NANOSECONDS
-from formation_gnc.nodes.record_in_process import InProcessRecorder
 from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.writer import CHUNK_BYTES, BagWriter, TopicDefinition
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
+from formation_gnc.transport.in_process_recorder import InProcessRecorder
+from formation_gnc.types import NANOSECONDS
 
 TICKS = 2000
 MESSAGES = 200_000
@@ -36,13 +36,13 @@ REPORT = """
 import re, sys
 from pathlib import Path
 from time import perf_counter
-from formation_gnc.analysis.flown import Flown
+from formation_gnc.analysis.run_history import RunHistory
 from formation_gnc.analysis.report import write_report
 from formation_gnc.recording.reader import Bag
 
 started = perf_counter()
 bag = Bag(sys.argv[1])
-write_report(bag, Flown(bag), Path(sys.argv[1]) / "report.html", "bench")
+write_report(bag, RunHistory(bag), Path(sys.argv[1]) / "report.html", "bench")
 # not ru_maxrss, which begins at that of the process before exec
 peak = int(re.search(r"VmHWM:\\s+(\\d+) kB", Path("/proc/self/status").read_text())[1])
 print(perf_counter() - started, peak / 1024)
@@ -115,9 +115,7 @@ def decode(path: Path) -> float:
 
 def report(path: Path) -> tuple[float, float]:
     """Seconds and peak memory (MB) of a process that writes a bag's report."""
-    answer = subprocess.run(
-        [sys.executable, "-c", REPORT, str(path)], capture_output=True, text=True, check=True
-    )
+    answer = subprocess.run([sys.executable, "-c", REPORT, str(path)], capture_output=True, text=True, check=True)
     seconds, megabytes = map(float, answer.stdout.split())
     return seconds, megabytes
 

@@ -97,29 +97,29 @@ class Leaf:
         if get_origin(self.type) is not tuple:
             return self._check_scalar(value, self.type)
         if not _is_list(value):
-            raise self._refusal(value, f"a list ({self.type_name})")
+            raise self._rejection(value, f"a list ({self.type_name})")
         values = tuple(self._check_scalar(item, get_args(self.type)[0]) for item in value)
         if self.limits.length is not None and len(values) != self.limits.length:
-            raise self._refusal(list(value), self.limits.allowed())
+            raise self._rejection(list(value), self.limits.allowed())
         return values
 
     def _check_scalar(self, value: Any, kind: type) -> Any:
         if isinstance(value, int) and not -(2**63) <= value < 2**63:
-            raise self._refusal(value, "within 64 bits, as ROS carries it")
+            raise self._rejection(value, "within 64 bits, as ROS carries it")
         if kind is float and isinstance(value, int) and not isinstance(value, bool):
             value = float(value)
         if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
-            raise self._refusal(value, f"a value of type {self.type_name}")
+            raise self._rejection(value, f"a value of type {self.type_name}")
         if isinstance(value, float) and not math.isfinite(value):
-            raise self._refusal(value, "finite")
+            raise self._rejection(value, "finite")
         limits = self.limits
         if limits.choices and value not in limits.choices:
-            raise self._refusal(value, limits.allowed())
+            raise self._rejection(value, limits.allowed())
         if kind in (int, float) and not (limits.minimum <= value <= limits.maximum and value > limits.above):
-            raise self._refusal(value, limits.allowed())
+            raise self._rejection(value, limits.allowed())
         return value
 
-    def _refusal(self, value: Any, allowed: str) -> ConfigurationError:
+    def _rejection(self, value: Any, allowed: str) -> ConfigurationError:
         return ConfigurationError(f"parameter {self.name}: {value!r} is not allowed; it must be {allowed}")
 
 
@@ -127,9 +127,7 @@ def _is_list(value: Any) -> bool:
     return isinstance(value, Sequence) and not isinstance(value, str | bytes)
 
 
-def leaves(
-    schema: type, values: Mapping[str, Any], prefix: str = "", defaults: Any = MISSING
-) -> Iterator[Leaf]:
+def leaves(schema: type, values: Mapping[str, Any], prefix: str = "", defaults: Any = MISSING) -> Iterator[Leaf]:
     """Every parameter of a schema, in order.
 
     `values` (dotted names) tells which names `per_name` has; the fields of the instance `defaults` go before

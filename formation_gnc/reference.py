@@ -5,10 +5,10 @@ from dataclasses import MISSING
 from pathlib import Path
 from typing import Any
 
-from formation_gnc.control.autopilot import ControllerParameters
-from formation_gnc.guidance.guide import GuidanceParameters
-from formation_gnc.mission import Mission
-from formation_gnc.navigation.navigator import NavigationParameters
+from formation_gnc.common import CommonParameters
+from formation_gnc.control.controller_manager import ControllerParameters
+from formation_gnc.guidance.guidance import GuidanceParameters
+from formation_gnc.navigation.navigation_filter import NavigationParameters
 from formation_gnc.nodes.display import DisplayParameters
 from formation_gnc.nodes.recorder import RecorderParameters
 from formation_gnc.nodes.replay import ReplayParameters
@@ -38,9 +38,9 @@ INTRODUCTION = """\
 Every parameter of every node, from the schemas that the nodes themselves check by. SI units and radians.
 
 - What is not given has its default; what has none must be given. `DEPUTY` stands for each name in `deputies`.
-- A value that is not allowed or not finite is refused with the reason, and so is a name that is not known.
+- A value that is not allowed or not finite is rejected with the reason, and so is a name that is not known.
 - A parameter that may change in flight does so at the first tick after it was set (`ros2 param set`), or at
-  the one that `schedule` foresees. Any other is refused once the node runs.
+  the one that `schedule` foresees. Any other is rejected once the node runs.
 
 A scenario is one ROS 2 parameter file for all nodes: `params/leader_follower.yaml` shows how.
 """
@@ -48,7 +48,7 @@ A scenario is one ROS 2 parameter file for all nodes: `params/leader_follower.ya
 
 def page() -> str:
     """The page as it should be."""
-    common = list(leaves(Mission, {}))
+    common = list(leaves(CommonParameters, {}))
     known = {leaf.name for leaf in common}
     sections = [INTRODUCTION, "## Every node\n", *_table(common)]
     for node, schema in SCHEMAS.items():

@@ -56,8 +56,6 @@ def nodes(context: LaunchContext) -> list[Node]:
         *(
             node(executable, namespace)
             for namespace in plant.get("deputies", ["deputy1"])
-            for executable in (
-                ["satellite"] if composed == "true" else ["navigation", "guidance", "controller"]
-            )
+            for executable in (["satellite"] if composed == "true" else ["navigation", "guidance", "controller"])
         ),
     ]

@@ -1,4 +1,4 @@
-"""The command as a user meets it: what it prints, what it refuses, and how it ends."""
+"""The command as a user meets it: what it prints, what it rejects, and how it ends."""
 
 import argparse
 import json
@@ -16,10 +16,10 @@ import pytest
 from formation_gnc import __version__
 from formation_gnc.cli import main
 from formation_gnc.commands import COMMANDS
-from formation_gnc.nodes import launcher
 from formation_gnc.recording.reader import Bag
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import find_scenario
+from formation_gnc.transport import launcher
 
 DEFAULT = find_scenario("leader_follower").read_text()
 
@@ -46,7 +46,7 @@ def scenario(path: Path, nodes: str, line: str) -> None:
     path.write_text(f"{DEFAULT}\n{nodes}: {{ros__parameters: {{{line}}}}}\n")
 
 
-def refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+def rejection(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     """The one line that a wrong call is answered with."""
     status = call(*arguments)
     output, errors = capsys.readouterr()
@@ -118,7 +118,7 @@ BAD_PARAMETERS = [
 
 @pytest.mark.parametrize("way", [["--in-process"], []], ids=["in-process", "graph"])
 class TestRefusals:
-    """Whatever is wrong with what is given, nothing has been started or written when it is refused."""
+    """Whatever is wrong with what is given, nothing has been started or written when it is rejected."""
 
     @pytest.fixture(autouse=True)
     def nothing_starts(self, desk: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
@@ -128,15 +128,13 @@ class TestRefusals:
         monkeypatch.setattr(launcher.Graph, "start", start)
         before = sorted(desk.rglob("*"))
         yield
-        assert [
-            path for path in sorted(desk.rglob("*")) if path not in before and path.name != "bad.yaml"
-        ] == []
+        assert [path for path in sorted(desk.rglob("*")) if path not in before and path.name != "bad.yaml"] == []
 
     @pytest.mark.parametrize(("options", "words"), BAD_OPTIONS)
     def test_an_option_that_is_not_allowed_is_named(
         self, options: list[str], words: str, way: list[str], capsys: pytest.CaptureFixture[str]
     ) -> None:
-        assert words in refusal(capsys, "sil", "leader_follower", *options, *way)
+        assert words in rejection(capsys, "sil", "leader_follower", *options, *way)
 
     @pytest.mark.parametrize(("nodes", "line", "words"), BAD_PARAMETERS)
     def test_a_parameter_that_is_not_allowed_is_named(
@@ -149,7 +147,7 @@ class TestRefusals:
         capsys: pytest.CaptureFixture[str],
     ) -> None:
         scenario(desk / "bad.yaml", nodes, line)
-        assert words in refusal(capsys, "sil", "bad.yaml", *way)
+        assert words in rejection(capsys, "sil", "bad.yaml", *way)
 
     @pytest.mark.parametrize(
         ("scenario", "words"),
@@ -162,26 +160,24 @@ class TestRefusals:
     def test_a_scenario_that_is_not_there_is_named(
         self, scenario: str, words: str, way: list[str], capsys: pytest.CaptureFixture[str]
     ) -> None:
-        assert words in refusal(capsys, "sil", scenario, *way)
+        assert words in rejection(capsys, "sil", scenario, *way)
 
 
 def test_pace_and_in_process_do_not_go_together(capsys: pytest.CaptureFixture[str]) -> None:
-    said = refusal(capsys, "sil", "leader_follower", "--in-process", "--real-time-factor", "5")
+    said = rejection(capsys, "sil", "leader_follower", "--in-process", "--real-time-factor", "5")
     assert "real_time_factor: has no effect in-process" in said
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"), [([], "required: COMMAND"), (["fly"], "invalid choice: 'fly'")]
-)
+@pytest.mark.parametrize(("arguments", "words"), [([], "required: COMMAND"), (["fly"], "invalid choice: 'fly'")])
 def test_a_command_that_there_is_not_is_answered_with_those_that_there_are(
     arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    said = refusal(capsys, *arguments)
+    said = rejection(capsys, *arguments)
     assert words in said
     assert said.endswith("see `formation-gnc --help`\n")
 
 
-def test_the_installed_command_refuses_in_one_line_too(desk: Path) -> None:
+def test_the_installed_command_rejects_in_one_line_too(desk: Path) -> None:
     ended = subprocess.run(
         ["formation-gnc", "sil", "nowhere"],
         cwd=desk,
@@ -216,9 +212,7 @@ def test_json_is_one_object_with_the_names_that_scripts_hold_on_to(
     assert bag.topics["/truth"].count == 31
 
 
-def test_the_summary_names_the_figures_the_bag_and_the_picture(
-    desk: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_summary_names_the_figures_the_bag_and_the_picture(desk: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert call("sil", "leader_follower", "--controller", "coast", "--duration", "12", "--in-process") == 0
     said = capsys.readouterr().out
     for words in (
@@ -280,9 +274,7 @@ def test_help_says_what_the_command_is_for_and_names_every_command(
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_the_help_of_a_command_describes_it_and_all_its_options(
-    name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_help_of_a_command_describes_it_and_all_its_options(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert call(name, "--help") == 0
     said = capsys.readouterr().out
     assert said.startswith(f"usage: formation-gnc {name}")

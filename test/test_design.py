@@ -1,4 +1,4 @@
-"""`formation-gnc design`: what it prints, what it draws and what it refuses."""
+"""`formation-gnc design`: what it prints, what it draws and what it rejects."""
 
 import json
 from pathlib import Path
@@ -11,9 +11,7 @@ from formation_gnc.sil.scenario import find_scenario
 
 
 @pytest.mark.parametrize("law", ALGORITHMS)
-def test_a_design_is_one_json_object_with_what_the_law_has(
-    law: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_design_is_one_json_object_with_what_the_law_has(law: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["design", "leader_follower", "--controller", law, "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     assert (said["scenario"], said["deputy"], said["algorithm"]) == ("leader_follower", "deputy1", law)
@@ -55,7 +53,7 @@ def test_a_design_is_printed_and_drawn_and_nothing_flies(
         (["bad.yaml", "--controller", "hinf"], "/deputy1/controller: hinf: the plant has poles on the imag"),
     ],
 )
-def test_what_cannot_be_designed_is_refused_in_one_line(
+def test_what_cannot_be_designed_is_rejected_in_one_line(
     options: list[str],
     words: str,
     tmp_path: Path,

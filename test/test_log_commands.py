@@ -12,14 +12,15 @@ import pytest
 
 from formation_gnc.analysis.compare import gnc_topics
 from formation_gnc.cli import main
-from formation_gnc.interface import NANOSECONDS, Timing
-from formation_gnc.nodes.conversion import codec
-from formation_gnc.nodes.record_in_process import reader
-from formation_gnc.nodes.topics import DEPTH
 from formation_gnc.recording.reader import Bag, identical, read
 from formation_gnc.recording.writer import BagWriter, TopicDefinition
+from formation_gnc.records import Timing
 from formation_gnc.sil.replay import KINDS, nodes_of, parameters_of, replay
 from formation_gnc.sil.scenario import find_scenario, load_scenario
+from formation_gnc.transport.conversion import codec
+from formation_gnc.transport.in_process_recorder import reader
+from formation_gnc.transport.topics import DEPTH
+from formation_gnc.types import NANOSECONDS
 
 
 @pytest.fixture(autouse=True)
@@ -81,7 +82,7 @@ def test_recover_has_nothing_to_save_of_a_file_that_is_all_zeros(
     assert not (tmp_path / "zeros_recovered").exists()
 
 
-def test_commands_refuse_a_bag_that_is_not_there_in_one_line(
+def test_commands_reject_a_bag_that_is_not_there_in_one_line(
     tmp_path: Path, flown: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     missing = str(tmp_path / "missing")
@@ -102,9 +103,7 @@ def test_compare_says_what_is_the_same_and_what_is_not(
     lines = capsys.readouterr().out.splitlines()
     assert f"{again}: identical on every GNC topic" in lines
     assert any(line.startswith(f"{other}: differs from {flown}") for line in lines)
-    assert any(line.startswith("  /deputy1/measurement at 0.000000000 s: ") for line in lines), (
-        "noise differs at once"
-    )
+    assert any(line.startswith("  /deputy1/measurement at 0.000000000 s: ") for line in lines), "noise differs at once"
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert main(["compare", str(flown), str(again), str(other), "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
@@ -138,10 +137,7 @@ def test_an_unchanged_replay_gives_the_recorded_bits(
     assert {name: topic.count for name, topic in again.topics.items()} == {
         name: topic.count for name, topic in Bag(flown).topics.items()
     }
-    assert (
-        again.metadata["parameters /deputy1/controller"]
-        == Bag(flown).metadata["parameters /deputy1/controller"]
-    )
+    assert again.metadata["parameters /deputy1/controller"] == Bag(flown).metadata["parameters /deputy1/controller"]
 
 
 def test_swaps_by_schedule_and_by_hand_are_flown_again_at_their_tick(
@@ -149,10 +145,7 @@ def test_swaps_by_schedule_and_by_hand_are_flown_again_at_their_tick(
 ) -> None:
     (tmp_path / "swaps.yaml").write_text(find_scenario("leader_follower").read_text() + SWAPS)
     bag = tmp_path / "swaps"
-    assert (
-        main(["sil", str(tmp_path / "swaps.yaml"), "--in-process", "--bag", str(bag), "--duration", "300"])
-        == 0
-    )
+    assert main(["sil", str(tmp_path / "swaps.yaml"), "--in-process", "--bag", str(bag), "--duration", "300"]) == 0
     assert replayed(bag, tmp_path / "again")[0] == 0
     assert list(Bag(bag).arrays("/events")["kind"]).count("parameters") == 3
     # without the schedule in its parameters, the same swaps are changes that somebody made in flight
@@ -188,9 +181,7 @@ def rewritten(
         for topic in bag.topics:
             schema, channel = bag.definition(topic)
             assert schema is not None
-            writer.add_defined_topic(
-                topic, TopicDefinition(schema.name, schema.data, metadata=channel.metadata)
-            )
+            writer.add_defined_topic(topic, TopicDefinition(schema.name, schema.data, metadata=channel.metadata))
         for topic, data, stamp in bag.messages():
             if number := numbers.get((topic, stamp), 2):
                 writer.write(topic, data, stamp, number)
@@ -251,9 +242,7 @@ def test_a_node_started_again_flies_with_what_it_was_started_with_then_if_the_ba
     # what somebody wants otherwise is so at every start
     wanted = tmp_path / "wanted.yaml"
     wanted.write_text("/**/controller: {ros__parameters: {algorithm: hinf}}")
-    _, again = replayed(
-        tmp_path / "known", tmp_path / "other", "--nodes", "controller", "--params", str(wanted)
-    )
+    _, again = replayed(tmp_path / "known", tmp_path / "other", "--nodes", "controller", "--params", str(wanted))
     assert set(again.arrays("/deputy1/status")["algorithm"].tolist()) == {"hinf"}
 
 
@@ -269,9 +258,7 @@ def test_a_changed_replay_differs_where_it_was_changed_and_only_there(
     assert not again.arrays("/deputy1/thrust")["force"].any(), "coasting commands nothing"
 
 
-def test_replay_refuses_what_it_cannot_fly(
-    flown: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_replay_rejects_what_it_cannot_fly(flown: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     wrong = tmp_path / "wrong.yaml"
     wrong.write_text("/**/controller: {ros__parameters: {algorithm: magic}}\n")
     for arguments, said in (
@@ -294,9 +281,7 @@ def test_export_writes_every_topic_or_those_asked_for_and_the_attachments(
     written = {path.name for path in everything.iterdir()}
     filled = {topic.strip("/").replace("/", ".") for topic, each in bag.topics.items() if each.count}
     assert written == {f"{topic}.{form}" for topic in filled} | set(bag.attachments)
-    assert load_scenario(str(everything / "leader_follower.yaml")).plant.duration == 300.0, (
-        "to be flown again"
-    )
+    assert load_scenario(str(everything / "leader_follower.yaml")).plant.duration == 300.0, "to be flown again"
     assert main(["export", str(flown), "--format", form, "--topic", "/truth", "--output", str(some)]) == 0
     (table,) = some.iterdir()
     frame = pd.read_csv(table) if form == "csv" else pd.read_parquet(table)

@@ -159,7 +159,7 @@ def test_every_node_is_where_ros2_run_looks_and_runs_in_the_projects_python():
         assert (executables / node).read_text().startswith(f"#!{ROOT}/.venv/bin/python")
 
 
-def test_another_ros_is_refused_in_one_line():
+def test_another_ros_is_rejected_in_one_line():
     result = run("tools/find_ros.sh", ROS_DISTRO="humble")
     assert (result.returncode, result.stdout) == (2, "")
     assert re.fullmatch(r"formation_gnc: .*Jazzy.*humble.*\n", result.stderr)
@@ -177,15 +177,11 @@ def test_a_sourced_jazzy_is_used_and_a_virtual_environment_with_the_wheels_is_no
         assert result.stdout == "wheels\n"
 
 
-@pytest.mark.parametrize(
-    ("lacking", "advice"), [("c++", "install g++"), ("python3.12", "install python3.12")]
-)
+@pytest.mark.parametrize(("lacking", "advice"), [("c++", "install g++"), ("python3.12", "install python3.12")])
 def test_a_machine_without_is_told_in_one_line_what_to_install(lacking, advice, tmp_path):
     shutil.copytree(ROOT / "tools", tmp_path / "tools")
     (tmp_path / ".ros").write_text(f"wheels for {tmp_path}\n")
-    result = run(
-        "tools/make_venv.sh", cwd=tmp_path, PATH=without(tmp_path, lacking), PYENV_ROOT=str(tmp_path)
-    )
+    result = run("tools/make_venv.sh", cwd=tmp_path, PATH=without(tmp_path, lacking), PYENV_ROOT=str(tmp_path))
     assert (result.returncode, result.stdout) == (2, "")
     assert result.stderr.count("\n") == 1
     assert advice in result.stderr
@@ -197,9 +193,7 @@ def test_the_lock_pins_every_package_with_its_hashes():
         entries = re.split(r"\n(?=[a-z0-9])", (ROOT / name).read_text().split("\n", 2)[2])
         assert len(entries) > 10
         for entry in entries:
-            assert re.match(r"[a-z0-9-]+==\S+ \\\n    --hash=sha256:[0-9a-f]{64}", entry), entry.split("\n")[
-                0
-            ]
+            assert re.match(r"[a-z0-9-]+==\S+ \\\n    --hash=sha256:[0-9a-f]{64}", entry), entry.split("\n")[0]
 
 
 LAUNCH_FILE = ROOT / "launch/sil.launch.py"
@@ -293,6 +287,4 @@ def test_a_plain_build_in_a_workspace_stands_alone(tmp_path):
     result = run("bash", "-c", f"source {folder}/install/setup.bash && python3 -c '{imports}'", cwd=tmp_path)
     assert Path(result.stdout.strip()).is_relative_to(folder / "install"), result.stderr
     share = folder / "install/formation_gnc/share/formation_gnc"
-    assert {path.name for path in (ROOT / "params").glob("*.yaml")} == {
-        p.name for p in (share / "params").iterdir()
-    }
+    assert {path.name for path in (ROOT / "params").glob("*.yaml")} == {p.name for p in (share / "params").iterdir()}

@@ -20,9 +20,7 @@ class Dish:
 @dataclass(frozen=True)
 class Station:
     masts: int = parameter(1, minimum=0, doc="masts")
-    site: tuple[float, ...] = parameter(
-        (0.0, 0.0), length=2, minimum=-90.0, maximum=90.0, doc="where it stands"
-    )
+    site: tuple[float, ...] = parameter((0.0, 0.0), length=2, minimum=-90.0, maximum=90.0, doc="where it stands")
 
 
 @dataclass(frozen=True)
@@ -77,7 +75,7 @@ anything = st.recursive(
 
 
 @given(st.sampled_from(sorted(dump(load(Network, {"name": "near"})))), anything)
-def test_any_value_is_either_flown_in_range_or_refused_by_name(name: str, value: Any) -> None:
+def test_any_value_is_either_flown_in_range_or_rejected_by_name(name: str, value: Any) -> None:
     values = {"name": "near", name: value}
     try:
         network = load(Network, values)
@@ -122,18 +120,14 @@ def test_any_value_is_either_flown_in_range_or_refused_by_name(name: str, value:
         ("kirunna.masts", 2, "unknown; did you mean kiruna.masts?"),
     ],
 )
-def test_a_refusal_names_the_parameter_the_value_and_what_is_allowed(
-    name: str, value: Any, words: str
-) -> None:
-    with pytest.raises(ConfigurationError) as refusal:
+def test_a_rejection_names_the_parameter_the_value_and_what_is_allowed(name: str, value: Any, words: str) -> None:
+    with pytest.raises(ConfigurationError) as rejection:
         load(Network, {"name": "near", name: value})
-    assert str(refusal.value) == f"parameter {name}: {words}"
+    assert str(rejection.value) == f"parameter {name}: {words}"
 
 
 def test_an_unknown_name_like_no_other_is_answered_with_all_that_are_known() -> None:
-    with pytest.raises(
-        ConfigurationError, match=r"parameter zzz: unknown; known: band, channels, down\.gain, .*"
-    ):
+    with pytest.raises(ConfigurationError, match=r"parameter zzz: unknown; known: band, channels, down\.gain, .*"):
         load(Network, {"name": "near", "zzz": 1})
 
 
@@ -193,9 +187,9 @@ def test_a_change_in_flight_leaves_the_original_alone() -> None:
     ],
 )
 def test_a_change_that_is_not_allowed_says_why(changes: dict[str, Any], words: str) -> None:
-    with pytest.raises(ConfigurationError) as refusal:
+    with pytest.raises(ConfigurationError) as rejection:
         change(load(Network, {"name": "near"}), changes)
-    assert str(refusal.value).startswith(words)
+    assert str(rejection.value).startswith(words)
 
 
 def test_setting_what_is_fixed_to_the_value_it_has_is_no_change() -> None:

@@ -2,10 +2,10 @@ from typing import Any
 
 import pytest
 
-from formation_gnc.nodes import topics
 from formation_gnc.parameters import dump, leaves, load
 from formation_gnc.recording.layout import foxglove_layout
 from formation_gnc.reference import LAYOUT_PAGE, PAGE, SCHEMAS, page
+from formation_gnc.transport import topics
 
 NEEDED = {
     "chief.semi_major_axis": 7.0e6,

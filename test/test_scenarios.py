@@ -27,9 +27,7 @@ def test_every_scenario_is_replayed_to_the_recorded_bits(
     assert json.loads(capsys.readouterr().out)["ticks"] == TICKS
     assert main(["replay", str(bag), "--bag", str(tmp_path / "again")]) == 0
     assert capsys.readouterr().out.splitlines()[-1] == "identical on every GNC topic"
-    counts = [
-        {name: topic.count for name, topic in Bag(path).topics.items()} for path in (bag, tmp_path / "again")
-    ]
+    counts = [{name: topic.count for name, topic in Bag(path).topics.items()} for path in (bag, tmp_path / "again")]
     assert counts[0] == counts[1]
     every_tick = [topic for topic in counts[0] if not topic.endswith(("/events", "/separation"))]
     assert min(counts[0][topic] for topic in every_tick) == TICKS

@@ -1,7 +1,7 @@
 """Kremmydas' acquisitions: four satellites with 8 uN, dark in the real eclipses, over 100 orbits.
 
 The flight software flies them (`netsat.yaml`): guidance gives targets and eclipses, MPC plans an orbit at a
-time, thrusters refuse to fire in the dark. Only estimates are the truth, and the truth is his at first:
+time, thrusters reject to fire in the dark. Only estimates are the truth, and the truth is his at first:
 Hill's equations.
 """
 
@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from formation_gnc.guidance.guide import Guide
-from formation_gnc.mission import Mission
+from formation_gnc.common import CommonParameters
+from formation_gnc.guidance.guidance import Guidance
 from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
 from formation_gnc.orbit.propagation import Propagator
 from formation_gnc.relative.hill import HillModel
@@ -66,7 +66,7 @@ class Acquisition:
 
 
 ACQUISITIONS = (
-    Acquisition("tetrahedral", "three_in_plane_one_out", 1000.0, 240.0, "Flown in 4.4", 0, 2.09),
+    Acquisition("tetrahedral", "three_in_plane_one_out", 1000.0, 240.0, "RunHistory in 4.4", 0, 2.09),
     Acquisition("equidistant", "helix", 400.0, 80.0, "Set in the listing of the main function", 0, 1.79),
     Acquisition("three_in_plane_one_out", "equidistant", 1000.0, 240.0, "To be tested by 4.2", 1, 1.58),
     Acquisition("equidistant", "tetrahedral", 1000.0, 240.0, "To be tested by 4.2", 0, 1.66),
@@ -127,7 +127,7 @@ def scenario(acquisition: Acquisition, setting: Setting) -> Scenario:
         return load_scenario(str(NETSAT), common | {"/plant": plant, "/**/guidance": guidance})
 
     places: dict[str, Any] = {
-        f"{name}.relative_state": Guide(f"/{name}/guidance", setup.guidance)
+        f"{name}.relative_state": Guidance(f"/{name}/guidance", setup.guidance)
         .configuration.design.states(np.zeros(1))[0]
         .tolist()
         for name, setup in load(acquisition.left, {}, "fixed").deputies.items()
@@ -140,10 +140,10 @@ def scenario(acquisition: Acquisition, setting: Setting) -> Scenario:
 class HillTruth(Propagator):
     """The chief under J2; the others by Hill's equations about it, thrust held along its axes."""
 
-    def __init__(self, mission: Mission) -> None:
-        """For the mission's orbit and tick."""
-        super().__init__(mission.tick, math.ceil(mission.tick / 10.0), epoch=mission.epoch)
-        self._model = HillModel(mission.mean_motion)
+    def __init__(self, common: CommonParameters) -> None:
+        """For the common's orbit and tick."""
+        super().__init__(common.tick, math.ceil(common.tick / 10.0), epoch=common.epoch)
+        self._model = HillModel(common.mean_motion)
 
     def fly(self, time: float, states: Array, forces: Array, masses: Array) -> Array:
         """States one tick later."""
@@ -159,7 +159,7 @@ class HillTruth(Propagator):
 class Flight:
     """What flew, of all four satellites."""
 
-    mission: Mission
+    common: CommonParameters
     states: Array
     """(4, N, 6)"""
     targets: Array
@@ -189,22 +189,22 @@ class Flight:
     @property
     def delta_v(self) -> Array:
         """(4,) sum over the axes, m/s."""
-        spent: Array = np.abs(self.forces).sum(axis=(1, 2)) * self.mission.tick / MASS
+        spent: Array = np.abs(self.forces).sum(axis=(1, 2)) * self.common.tick / MASS
         return spent
 
     def worst(self, orbit: int) -> Array:
         """(4,) largest error in an orbit, from 1, m."""
-        ticks = math.tau / self.mission.mean_motion / self.mission.tick
+        ticks = math.tau / self.common.mean_motion / self.common.tick
         part: Array = self.errors[:, round((orbit - 1) * ticks) : round(orbit * ticks)].max(axis=1)
         return part
 
     def least(self, satellite: int) -> float:
         """Delta-v, m/s, without which no law comes to the target in this time with these eclipses."""
         return least_delta_v(
-            HillModel(self.mission.mean_motion),
+            HillModel(self.common.mean_motion),
             self.states[satellite, 0],
             self.targets[satellite, -1],
-            self.mission.tick,
+            self.common.tick,
             ~self.shaded[:-1],
             LIMIT / MASS,
         )
@@ -223,9 +223,7 @@ def fly(acquisition: Acquisition, setting: Setting) -> Flight:
     names = run.plant.parameters.deputies
     return Flight(
         flown.plant,
-        np.array(
-            [[truth.deputies[index].relative_state for truth in records["/truth"]] for index in range(4)]
-        ),
+        np.array([[truth.deputies[index].relative_state for truth in records["/truth"]] for index in range(4)]),
         np.array([[target.relative_state for target in records[f"/{name}/target"]] for name in names]),
         np.array([[thrust.force for thrust in records[f"/{name}/thrust"]] for name in names]),
         np.array([any(each.eclipse for each in truth.deputies) for truth in records["/truth"]]),
@@ -442,9 +440,7 @@ def guard(acquisition: Acquisition, flights: Mapping[Setting, Flight]) -> list[F
     usual = acquisition.over_least
     return [
         # Tens to hundreds of metres: the weight pays for no more.
-        Figure(
-            f"{name}, 1.7: worst error", "not printed", flights[PRINTED].worst(100).max(), "m", 10.0, 1000.0
-        ),
+        Figure(f"{name}, 1.7: worst error", "not printed", flights[PRINTED].worst(100).max(), "m", 10.0, 1000.0),
         Figure(
             f"{name}: places out of reach",
             "not printed",
@@ -471,9 +467,7 @@ def guard(acquisition: Acquisition, flights: Mapping[Setting, Flight]) -> list[F
             (1.0 + TOLERANCE) * usual,
         ),
         # A kilometre squared over the orbit's radius, 0.14 m, and the drift that it grows to over a plan.
-        Figure(
-            f"{name}, two-body truth: worst error", "not printed", two_body.worst(100).max(), "m", 0.0, 10.0
-        ),
+        Figure(f"{name}, two-body truth: worst error", "not printed", two_body.worst(100).max(), "m", 0.0, 10.0),
         # Metres an orbit, met once an orbit: tens.
         Figure(f"{name}, J2 truth: worst error", "not printed", oblate.worst(100).max(), "m", 0.0, 40.0),
         # Differential J2 pulls a kilometre apart by some 0.1 m/s a day across the track, in the worst phase.
@@ -510,11 +504,9 @@ def draw_thrust(flights: Mapping[tuple[Acquisition, Setting], Flight], path: Pat
     for row, acquisition in zip(panels, ACQUISITIONS, strict=True):
         flight = flights[acquisition, SHARED]
         count = 3 * flight.errors.shape[1] // ORBITS
-        orbits = np.arange(count) * flight.mission.tick * flight.mission.mean_motion / math.tau
+        orbits = np.arange(count) * flight.common.tick * flight.common.mean_motion / math.tau
         for index, panel in enumerate(row):
-            panel.fill_between(
-                orbits, -9.0, 9.0, where=flight.dark[:count], color="0.85", step="post", lw=0.0
-            )
+            panel.fill_between(orbits, -9.0, 9.0, where=flight.dark[:count], color="0.85", step="post", lw=0.0)
             panel.step(orbits, 1e6 * flight.forces[index, :count], where="post", label=AXES)
             panel.set(title=f"{acquisition.name}\nsatellite {index + 1}", ylim=(-9.0, 9.0))
         row[0].set_ylabel("force, uN")

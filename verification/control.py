@@ -13,18 +13,19 @@ import matplotlib as mpl
 import numpy as np
 from numpy.typing import NDArray
 
+from formation_gnc.common import CommonParameters, Orbit
 from formation_gnc.control.controller import Controller, Vehicle
 from formation_gnc.control.hinf import HInfinityController, HinfParameters
 from formation_gnc.control.lqr import LinearQuadraticRegulator, LqrParameters
 from formation_gnc.control.riccati import Weights, stationary_gain
-from formation_gnc.interface import NANOSECONDS, NavigationState, Target
-from formation_gnc.mission import Mission, Orbit
 from formation_gnc.orbit.constants import MU
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import hill_rotation, inertial_from_relative, relative_from_inertial
 from formation_gnc.orbit.propagation import advance_with_transition
+from formation_gnc.records import NavigationState, Target
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.schweighart_sedwick import CircularReference, SchweighartSedwickModel
+from formation_gnc.types import NANOSECONDS
 from verification.acquisitions import kremmydas, least_delta_v
 from verification.figure import TABLE, Figure, failures, save
 from verification.laws import all_laws
@@ -70,7 +71,7 @@ def fly(
 
 
 GEO_RATE = 7.2921e-5
-GEO = Mission(Orbit((MU / GEO_RATE**2) ** (1.0 / 3.0)), tick=0.1 * MINUTE)
+GEO = CommonParameters(Orbit((MU / GEO_RATE**2) ** (1.0 / 3.0)), tick=0.1 * MINUTE)
 GEO_MASS = 1000.0
 """kg; the thesis gives none."""
 
@@ -117,9 +118,7 @@ def neokleous(directory: Path) -> tuple[str, list[Figure]]:
         poles = np.sort_complex(np.linalg.eigvals(phi - gamma @ gain))[1::2]
         lines.append(f"| {weight:g} I | " + ", ".join(f"{pole:.4f}" for pole in poles) + " |")
         if weight == 1.0:
-            for pole, printed in zip(
-                poles, (0.9156 + 0.0462j, 0.9159 + 0.0458j, 0.9161 + 0.0454j), strict=True
-            ):
+            for pole, printed in zip(poles, (0.9156 + 0.0462j, 0.9159 + 0.0458j, 0.9161 + 0.0454j), strict=True):
                 figures.append(
                     Figure(
                         f"distance to the printed eigenvalue {printed}",
@@ -186,9 +185,7 @@ def neokleous(directory: Path) -> tuple[str, list[Figure]]:
     ]
     figures += [
         Figure("least spending over LQR's", "above 0.0076", share, "", 0.05, 0.12),
-        Figure(
-            "best gamma, printed weights", "below 1 asked", neokleous_hinf(math.inf).best_gamma, "", 2.1, 2.3
-        ),
+        Figure("best gamma, printed weights", "below 1 asked", neokleous_hinf(math.inf).best_gamma, "", 2.1, 2.3),
     ]
     lines += [
         "1 km off in every axis, thrust limited to 1 N on 1000 kg; 20 hours.",
@@ -205,9 +202,7 @@ def neokleous(directory: Path) -> tuple[str, list[Figure]]:
         states, forces = fly(law(), chief, start, lambda _: origin, GEO.tick, 12000, GEO_MASS, 1.0)
         size = np.abs(states[:, :3]).max(axis=1).round(6)  # micrometres are rounding
         settled = (np.flatnonzero(size > 10.0)[-1] + 1) * 0.1
-        lines.append(
-            f"| {name} | {settled:.0f} | {size[-600:].max():.3g} | {max(0.0, -states[:, :3].min()):.3g} |"
-        )
+        lines.append(f"| {name} | {settled:.0f} | {size[-600:].max():.3g} | {max(0.0, -states[:, :3].min()):.3g} |")
         figures.append(Figure(f"1 km, 1 N, {name}: time to 10 m", "settles", settled, "min", 0.0, 600.0))
         figures.append(Figure(f"1 km, 1 N, {name}: last hour", "settles", size[-600:].max(), "m", 0.0, 0.2))
         minutes = np.arange(len(states)) * 0.1
@@ -247,10 +242,8 @@ def roberts(directory: Path) -> tuple[str, list[Figure]]:
     }
     aim = np.array([0.0, -100.0, 0.0, 0.0, 0.0, 0.0])
     plot, panels = plt.subplots(1, 2, figsize=(13, 5))
-    for place, (orbit, radius, inclination) in enumerate(
-        (("MUSTANG", 6978.1e3, 85.0), ("35 deg", 7000e3, 35.0))
-    ):
-        mission = Mission(Orbit(radius, inclination=math.radians(inclination)), tick=1.0)
+    for place, (orbit, radius, inclination) in enumerate((("MUSTANG", 6978.1e3, 85.0), ("35 deg", 7000e3, 35.0))):
+        common = CommonParameters(Orbit(radius, inclination=math.radians(inclination)), tick=1.0)
         reference = CircularReference(radius, math.radians(inclination))
         ticks = round(SchweighartSedwickModel(reference).period)
         speed = math.sqrt(MU / radius)
@@ -261,9 +254,9 @@ def roberts(directory: Path) -> tuple[str, list[Figure]]:
                 (speed * (math.sqrt(1.0 + reference.averaged) - 1.0), 0.0),
                 (0.0, 10.0),
             ):
-                chief = state_from_elements(Elements(**vars(mission.chief)))
+                chief = state_from_elements(Elements(**vars(common.chief)))
                 chief[3:] *= 1.0 + correction / speed
-                law = LinearQuadraticRegulator(parameters, mission, Vehicle(100.0, np.full(3, 0.01)))
+                law = LinearQuadraticRegulator(parameters, common, Vehicle(100.0, np.full(3, 0.01)))
                 start = aim + np.array([offset, offset, offset, 0.0, 0.0, 0.0])
                 states, forces = fly(law, chief, start, lambda _: aim, 1.0, ticks, 100.0, 0.01)
                 spent.append(1e3 * np.abs(forces).sum() / 100.0)
@@ -287,9 +280,7 @@ def roberts(directory: Path) -> tuple[str, list[Figure]]:
             0.999,
             1.0,
         ),
-        Figure(
-            "MUSTANG, time-varying over Hill", "0.847 (2.6685 mm/s)", varying[0] / hill[0], "", 0.99, 1.01
-        ),
+        Figure("MUSTANG, time-varying over Hill", "0.847 (2.6685 mm/s)", varying[0] / hill[0], "", 0.99, 1.01),
         Figure("35 deg, without correction", "0.7044 mm/s", low[0], "mm/s", 1.4, 2.0),
         Figure("35 deg, with correction", "0.5168 mm/s", low[1], "mm/s", 0.9, 1.3),
         Figure("35 deg, saved by the correction", "26.6 %", 100.0 * (1.0 - low[1] / low[0]), "%", 20.0, 45.0),

@@ -45,9 +45,7 @@ ROUNDING = 1e-4
 """Tolerance where both programs solve the same equations, m after a day; the requirement is 1 mm."""
 
 
-def fly(
-    orbit: Elements, forces: Forces, tick: float = 1.0, duration: float = DAY, epoch: float = EPOCH
-) -> Array:
+def fly(orbit: Elements, forces: Forces, tick: float = 1.0, duration: float = DAY, epoch: float = EPOCH) -> Array:
     """Our state after a duration, flown tick by tick as the plant does."""
     propagator = Propagator(tick, 1, forces, (BODY,), epoch)
     states, thrust = state_from_elements(orbit)[None], np.zeros((1, 3))
@@ -87,13 +85,8 @@ def gravity_against_heyoka(directory: Path) -> tuple[str, list[Figure]]:
             )
         rows.append(f"| {name} | " + " | ".join(f"{value * 1e6:.1f}" for value in found) + " |")
     ticks = (1.0, 10.0, 30.0, 60.0, 120.0)
-    truth = {
-        place: Heyoka(Forces(), EPOCH).fly(state_from_elements(orbit), DAY) for place, orbit in ORBITS.items()
-    }
-    steps = {
-        place: [apart(fly(orbit, Forces(), t), truth[place]) for t in ticks]
-        for place, orbit in ORBITS.items()
-    }
+    truth = {place: Heyoka(Forces(), EPOCH).fly(state_from_elements(orbit), DAY) for place, orbit in ORBITS.items()}
+    steps = {place: [apart(fly(orbit, Forces(), t), truth[place]) for t in ticks] for place, orbit in ORBITS.items()}
     text = f"""## Gravity against heyoka
 
 heyoka integrates the same potential, differentiated by itself, by Taylor series; in extended precision,
@@ -133,9 +126,7 @@ def forces_against_basilisk(directory: Path) -> tuple[str, list[Figure]]:
         ours = fly(orbit, forces)
         theirs = Basilisk(forces, EPOCH, state_from_elements(orbit)[None], step, BODY, places).fly(DAY)[0]
         difference, effect = apart(ours, theirs), apart(ours, plain[place])
-        figures.append(
-            Figure(f"{name}, {place}, Basilisk at {step:.0f} s", "", difference, "m", 0.0, tolerance)
-        )
+        figures.append(Figure(f"{name}, {place}, Basilisk at {step:.0f} s", "", difference, "m", 0.0, tolerance))
         rows.append(f"| {name} | {place} | {number(effect)} | {step:.0f} | {number(difference)} | {why} |")
 
     held = "Basilisk holds shadow, density and wind over a step"
@@ -211,12 +202,8 @@ def conservation(directory: Path) -> tuple[str, list[Figure]]:
             momentum = np.cross(flown[:, :3], flown[:, 3:])[:, 2]
             lost, turned = (np.abs(v / v[0] - 1) for v in (energy, momentum))
             chart.semilogy(np.arange(len(lost)) * every / DAY, lost + 1e-17, label=f"{place}, energy", lw=0.8)
-            figures.append(
-                Figure(f"energy, {name}, {place}, 10 days", "conserved", lost.max(), "", 0.0, 1e-12)
-            )
-            figures.append(
-                Figure(f"h_z, {name}, {place}, 10 days", "conserved", turned.max(), "", 0.0, 1e-12)
-            )
+            figures.append(Figure(f"energy, {name}, {place}, 10 days", "conserved", lost.max(), "", 0.0, 1e-12))
+            figures.append(Figure(f"h_z, {name}, {place}, 10 days", "conserved", turned.max(), "", 0.0, 1e-12))
             rows.append(f"| {name} | {place} | {lost.max():.1e} | {turned.max():.1e} |")
         chart.set(title=name, xlabel="days")
         chart.grid(alpha=0.3)
@@ -272,9 +259,7 @@ def neokleous(directory: Path) -> tuple[str, list[Figure]]:
         for chart in charts[:, column]:
             chart.grid(alpha=0.3)
         extent = np.abs(relative).max(axis=0) / 1e3
-        rows.append(
-            f"| {name} | {np.ptp(change) / 1e3:.3f} | " + " | ".join(f"{v:.3f}" for v in extent) + " |"
-        )
+        rows.append(f"| {name} | {np.ptp(change) / 1e3:.3f} | " + " | ".join(f"{v:.3f}" for v in extent) + " |")
         if column == 0:
             # From rest in Hill's equations under the constant pull a = 3/2 mu J2 R^2 / r^4:
             # x = -(a / n^2)(1 - cos nt), at most 2 a / n^2 = 3 J2 R^2 / r inwards.
@@ -293,9 +278,7 @@ def neokleous(directory: Path) -> tuple[str, list[Figure]]:
         else:
             theirs = Basilisk(forces, epoch, chief[None], 10.0, BODY, jpl()).fly(duration + tick)[0]
             difference = apart(states[0], theirs)
-            figures.append(
-                Figure(f"{name}, after two days", "Basilisk with DE421", difference, "m", 0.0, 60.0)
-            )
+            figures.append(Figure(f"{name}, after two days", "Basilisk with DE421", difference, "m", 0.0, 60.0))
     charts[0, 0].set_ylabel("change of radius, km")
     charts[1, 0].set_ylabel("relative to the ideal orbit, km")
     charts[1, 0].legend(fontsize=8)

@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 
 from bench import fleet as bench
 from formation_gnc.analysis.compare import gnc_topics
-from formation_gnc.analysis.flown import Flown
 from formation_gnc.analysis.metrics import figures as figures_of
 from formation_gnc.analysis.metrics import trajectory
+from formation_gnc.analysis.run_history import RunHistory
 from formation_gnc.analysis.separation import predicted_approach
 from formation_gnc.cli import main as command
+from formation_gnc.common import CommonParameters, Orbit
 from formation_gnc.guidance.assignment import assign, assign_with_phase, transfer_costs
 from formation_gnc.guidance.registry import FORMATIONS
 from formation_gnc.guidance.targets import TARGET_MODELS, TargetPath
-from formation_gnc.mission import Mission, Orbit
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.forces import Forces
 from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
@@ -38,23 +38,23 @@ import matplotlib.pyplot as plt
 Array = NDArray[np.float64]
 
 ORBITS, POINTS = 10, 32
-CIRCULAR = Mission(Orbit(7078136.3, 0.0, 1.7104, 0.0, 0.0, 0.0))
-ECCENTRIC = Mission(Orbit(7078136.3 / 0.9, 0.1, 1.7104, 0.0, 0.5, 0.0))
+CIRCULAR = CommonParameters(Orbit(7078136.3, 0.0, 1.7104, 0.0, 0.0, 0.0))
+ECCENTRIC = CommonParameters(Orbit(7078136.3 / 0.9, 0.1, 1.7104, 0.0, 0.5, 0.0))
 CHIEFS = (("circular, 700 km, i = 98 deg", CIRCULAR), ("e = 0.1, perigee 700 km", ECCENTRIC))
 CASES = 100
 CHANGE = 8890.0
 """When the scenario tetrahedral changes its formation, s."""
 
 
-def times(mission: Mission) -> Array:
+def times(common: CommonParameters) -> Array:
     """Instants of ten orbits, s."""
-    return math.tau / mission.mean_motion / POINTS * np.arange(ORBITS * POINTS + 1)
+    return math.tau / common.mean_motion / POINTS * np.arange(ORBITS * POINTS + 1)
 
 
-def path(name: str, slot: int, model: str, mission: Mission) -> TargetPath:
+def path(name: str, slot: int, model: str, common: CommonParameters) -> TargetPath:
     """Target of a place of a formation with its default parameters."""
     formation = FORMATIONS[name]
-    return TARGET_MODELS[model](formation(formation.Parameters(), mission.mean_motion, slot), 0.0, mission)
+    return TARGET_MODELS[model](formation(formation.Parameters(), common.mean_motion, slot), 0.0, common)
 
 
 def places(name: str) -> range:
@@ -63,11 +63,11 @@ def places(name: str) -> range:
     return range(formation.places(formation.Parameters()) or 4)
 
 
-def flown(starts: Array, mission: Mission, forces: Forces) -> Array:
+def flown(starts: Array, common: CommonParameters, forces: Forces) -> Array:
     """(satellites, N, 6) relative states of satellites that start at `starts` (satellites, 6), unthrusted."""
-    chief = state_from_elements(Elements(**vars(mission.chief)))
+    chief = state_from_elements(Elements(**vars(common.chief)))
     states = np.array([chief, *(inertial_from_relative(chief, start) for start in starts)])
-    step = math.tau / mission.mean_motion / POINTS
+    step = math.tau / common.mean_motion / POINTS
     propagator = Propagator(step, substeps=20, forces=forces)
     none, history = np.zeros_like(states[:, :3]), []
     for index in range(ORBITS * POINTS + 1):
@@ -76,14 +76,14 @@ def flown(starts: Array, mission: Mission, forces: Forces) -> Array:
     return np.array(history).transpose(1, 0, 2)
 
 
-def own_flight(starts: Array, model: str, mission: Mission, carried: list[TargetPath]) -> Array:
+def own_flight(starts: Array, model: str, common: CommonParameters, carried: list[TargetPath]) -> Array:
     """(satellites, N, 6) free flight of `starts` under the target's own model, step by step."""
-    instants = times(mission)
+    instants = times(common)
     step = float(instants[1])
     if model == "yamanaka_ankersen":
         linear = TschaunerHempelModel(carried[0]._model.chief)  # type: ignore[attr-defined]
     else:
-        linear = HillModel(mission.mean_motion) if model == "hill" else carried[0]._model  # type: ignore[attr-defined]
+        linear = HillModel(common.mean_motion) if model == "hill" else carried[0]._model  # type: ignore[attr-defined]
     states, history = starts, [starts]
     for instant in instants[:-1]:
         states = states @ linear.transition(float(instant), step).T
@@ -105,7 +105,7 @@ def drifts(directory: Path) -> tuple[str, list[Figure]]:
         "",
     ]
     plot, charts = plt.subplots(1, 2, figsize=(14, 5.5))
-    for chart, (title, mission) in zip(charts, CHIEFS, strict=True):
+    for chart, (title, common) in zip(charts, CHIEFS, strict=True):
         lines += [
             f"### Chief: {title}",
             "",
@@ -114,21 +114,19 @@ def drifts(directory: Path) -> tuple[str, list[Figure]]:
         ]
         for name in FORMATIONS:
             for model in TARGET_MODELS:
-                carried = [path(name, slot, model, mission) for slot in places(name)]
-                targets = np.array([each.states(times(mission)) for each in carried])
+                carried = [path(name, slot, model, common) for slot in places(name)]
+                targets = np.array([each.states(times(common)) for each in carried])
                 size = float(np.linalg.norm(targets[..., :3], axis=2).max())
                 off = {
                     label: np.linalg.norm((flight - targets)[..., :3], axis=2).max(axis=0)
                     for label, flight in (
-                        ("own", own_flight(targets[:, 0], model, mission, carried)),
-                        ("two-body", flown(targets[:, 0], mission, point_mass)),
-                        ("J2", flown(targets[:, 0], mission, oblate)),
+                        ("own", own_flight(targets[:, 0], model, common, carried)),
+                        ("two-body", flown(targets[:, 0], common, point_mass)),
+                        ("J2", flown(targets[:, 0], common, oblate)),
                     )
                 }
                 worst = {label: float(values.max()) for label, values in off.items()}
-                lines.append(
-                    f"| {name} | {model} | {worst['own']:.1e} | {worst['two-body']:.3g} | {worst['J2']:.3g} |"
-                )
+                lines.append(f"| {name} | {model} | {worst['own']:.1e} | {worst['two-body']:.3g} | {worst['J2']:.3g} |")
                 figures.append(
                     Figure(
                         f"{name}, {model}, {title}, own model",
@@ -140,12 +138,8 @@ def drifts(directory: Path) -> tuple[str, list[Figure]]:
                     )
                 )
                 if name == "projected_circular_orbit":
-                    chart.semilogy(
-                        times(mission)[1:] * mission.mean_motion / math.tau, off["J2"][1:], label=model
-                    )
-        chart.set(
-            title=f"projected circular orbit under J2; {title}", xlabel="orbits", ylabel="off its target, m"
-        )
+                    chart.semilogy(times(common)[1:] * common.mean_motion / math.tau, off["J2"][1:], label=model)
+        chart.set(title=f"projected circular orbit under J2; {title}", xlabel="orbits", ylabel="off its target, m")
         chart.grid(alpha=0.3, which="both")
         chart.legend()
         lines.append("")
@@ -168,9 +162,7 @@ def assignments(directory: Path) -> tuple[str, list[Figure]]:
         return np.array([formation(formation.Parameters(), rate, k).states(at)[0] for k in range(4)])
 
     tetrahedron = FORMATIONS["tetrahedral"]
-    start = np.array(
-        [tetrahedron(tetrahedron.Parameters(), rate, k).states(np.zeros(1))[0] for k in range(4)]
-    )
+    start = np.array([tetrahedron(tetrahedron.Parameters(), rate, k).states(np.zeros(1))[0] for k in range(4)])
     generator = np.random.default_rng(1)
     cases = [start]
     for _ in range(CASES):  # bounded relative orbits of some hundred metres
@@ -182,9 +174,7 @@ def assignments(directory: Path) -> tuple[str, list[Figure]]:
         table = costs(0.0)
         slots = assign(table)
         best = assign_with_phase(costs)
-        spent.append(
-            [float(np.trace(table)), float(table[range(4), list(slots)].sum()), float(sum(best.delta_v))]
-        )
+        spent.append([float(np.trace(table)), float(table[range(4), list(slots)].sum()), float(sum(best.delta_v))])
     ours = np.array(spent)
     saved = 1.0 - ours[:, 1:] / ours[:, :1]
     random = saved[1:]
@@ -258,7 +248,7 @@ def of_fleet(graph: Bag, process: Bag) -> tuple[str, list[Figure]]:
         to_go, later = (float(np.interp(CHANGE + wait, path.time, off)) for wait in (1.0, orbit))
         lines.append(f"| {name} | {to_go:.0f} | {later:.1f} | {last:.2f} | {deputy.delta_v_m_s:.3f} |")
     lines += ["", "| nearest approach | m | who | when, s |", "|---|---|---|---|"]
-    nearest = Flown(graph).nearest
+    nearest = RunHistory(graph).nearest
     foreseen = {kind: predicted_approach(graph, kind) for kind in ("planned", "passive")}
     words = {
         "planned": "predicted, one on target and the others coasting",
@@ -299,10 +289,7 @@ def eight(_: Path) -> tuple[str, list[Figure]]:
             f"{1e3 * each.satellites / each.deputies:.2f} | {1e3 * each.work:.2f} | {each.cores:.2f} | "
             f"{1e3 * each.arithmetic:.2f} |"
         )
-    figures = [
-        Figure(f"ticks missed, {name}", "(required)", each.misses, "", 0.0, 0.0)
-        for name, each in flown.items()
-    ]
+    figures = [Figure(f"ticks missed, {name}", "(required)", each.misses, "", 0.0, 0.0) for name, each in flown.items()]
     lines += ["", TABLE, *(figure.row for figure in figures), ""]
     return "\n".join(lines), figures
 
@@ -315,9 +302,7 @@ def main(directory: Path) -> int:
         text, limits = part(directory)
         sections.append(text)
         figures += limits
-    heading = (
-        "# Guidance\n\nWritten by `verification/guidance.py`; theory: [guidance](../theory/guidance.md).\n\n"
-    )
+    heading = "# Guidance\n\nWritten by `verification/guidance.py`; theory: [guidance](../theory/guidance.md).\n\n"
     (directory / "guidance.md").write_text(heading + "\n".join(sections))
     return failures(figures)
 

@@ -253,9 +253,7 @@ class Basilisk:
         light = radiationPressure.RadiationPressure()
         light.setUseCannonballModel()
         # Its solar constant may be another: the force per area is made the same.
-        light.area = (
-            self.body.area * SOLAR_PRESSURE / (astroConstants.SOLAR_FLUX_EARTH / astroConstants.SPEED_LIGHT)
-        )
+        light.area = self.body.area * SOLAR_PRESSURE / (astroConstants.SOLAR_FLUX_EARTH / astroConstants.SPEED_LIGHT)
         light.coefficientReflection = self.body.reflectivity
         light.sunEphmInMsg.subscribeTo(self._sky.sun)
         light.sunEclipseInMsg.subscribeTo(shadow.eclipseOutMsgs[0])

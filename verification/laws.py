@@ -99,9 +99,7 @@ class Row:
             ours, least = getattr(self, field), getattr(expected, field, float("nan"))
             margin = relative * least + absolute
             words = field.replace("_", " ")
-            figures.append(
-                Figure(f"{self.name}: {words}", f"{least:.4g}", ours, unit, least - margin, least + margin)
-            )
+            figures.append(Figure(f"{self.name}: {words}", f"{least:.4g}", ours, unit, least - margin, least + margin))
         return figures
 
 
@@ -168,9 +166,7 @@ def fly(scenario: str, law: str, knows: str) -> Row:
     for index, name in enumerate(names):
         aims = np.array([target.relative_state for target in records[f"/{name}/target"]])
         true = [truth.deputies[index] for truth in records["/truth"]]
-        errors.append(
-            np.linalg.norm((np.array([each.relative_state for each in true]) - aims)[:, :3], axis=1)
-        )
+        errors.append(np.linalg.norm((np.array([each.relative_state for each in true]) - aims)[:, :3], axis=1))
         forces.append([thrust.force for thrust in records[f"/{name}/thrust"]])
         masses.append([each.mass for each in true])
         limited.append([any(status.saturated) for status in records[f"/{name}/status"]])

@@ -1,4 +1,4 @@
-"""The navigation filter: consistent, blind where it says so, near the bound, and robust.
+"""The navigation filter: consistent, unobservable where it says so, near the bound, and robust.
 
 `main` writes `navigation.md` and its plots, and returns the number of figures outside their tolerance.
 """
@@ -16,15 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from formation_gnc.interface import Estimate, EstimateStatus, Measurement, Refusal, Sensor
-from formation_gnc.mission import Orbit
+from formation_gnc.common import Orbit
 from formation_gnc.navigation import kernels
 from formation_gnc.navigation.measurement import NAMES
-from formation_gnc.navigation.navigator import NavigationParameters
-from formation_gnc.navigation.observability import orbit_period, predicted_blind_direction
-from formation_gnc.navigation.process import Leg, NonlinearProcess, process_noise, substeps
-from formation_gnc.navigation.rehearsal import START, Sample, navigator, nees, rehearse
+from formation_gnc.navigation.navigation_filter import NavigationParameters
+from formation_gnc.navigation.observability import orbit_period, predicted_unobservable_direction
+from formation_gnc.navigation.process import Interval, NonlinearProcess, process_noise, substeps
 from formation_gnc.orbit.frames import hill_transform
+from formation_gnc.records import Estimate, EstimateStatus, Measurement, Rejection, Sensor
+from formation_gnc.sil.monte_carlo import START, Sample, navigator, nees, simulate_measurements
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
 from verification.figure import Figure, failures
@@ -48,9 +48,7 @@ WIDE = {"fix_position_sigma": 50.0, "fix_velocity_sigma": 0.02}
 """A start uncertain enough to see what converges and what does not."""
 
 ORBITS: dict[str, Callable[..., NavigationParameters]] = {
-    "LEO, i = 50 deg": partial(
-        NavigationParameters, chief=LEO, tick=10.0, acceleration_density=1e-10, **WIDE
-    ),
+    "LEO, i = 50 deg": partial(NavigationParameters, chief=LEO, tick=10.0, acceleration_density=1e-10, **WIDE),
     "GEO": partial(NavigationParameters, chief=GEO, tick=120.0, acceleration_density=1e-14, **WIDE),
 }
 TICKS = {"LEO, i = 50 deg": 584, "GEO": 719}
@@ -71,7 +69,7 @@ class Campaign:
     """(R, N, k) in standard deviations."""
     sigma: Array
     """(N, 6) of the last run."""
-    refused: int
+    rejected: int
     chief: Array
     """(6,) inertial state at the end."""
     final: Estimate
@@ -86,11 +84,11 @@ def campaign(parameters: NavigationParameters, ticks: int, runs: int, start: Arr
         np.empty((runs, ticks)),
         np.zeros((runs, ticks, count)),
     )
-    refused = 0
+    rejected = 0
     for run in range(runs):
         filter = navigator(parameters)
         for tick, sample in enumerate(
-            rehearse(parameters, ticks, np.random.default_rng([4, run]), start=start)
+            simulate_measurements(parameters, ticks, np.random.default_rng([4, run]), start=start)
         ):
             estimate = filter.on_tick(sample.measurement)
             assert estimate is not None
@@ -101,8 +99,8 @@ def campaign(parameters: NavigationParameters, ticks: int, runs: int, start: Arr
                 innovation[run, tick] = np.divide(estimate.innovation, estimate.innovation_sigma)
             if run == runs - 1:
                 sigma[tick] = np.sqrt(np.diag(estimate.covariance))
-        refused += int(estimate.refusals.sum())
-    return Campaign(error, squared, nis, innovation, sigma, refused, sample.measurement.chief_state, estimate)
+        rejected += int(estimate.rejections.sum())
+    return Campaign(error, squared, nis, innovation, sigma, rejected, sample.measurement.chief_state, estimate)
 
 
 def cramer_rao(parameters: NavigationParameters, ticks: int) -> Array:
@@ -119,12 +117,10 @@ def cramer_rao(parameters: NavigationParameters, ticks: int) -> Array:
     sigmas = np.array([getattr(parameters, f"{NAMES[Sensor(sensor)]}_sigma") for sensor in sensors])
     bound = np.empty((ticks, 6))
     last: Sample | None = None
-    for tick, sample in enumerate(rehearse(still, ticks, np.random.default_rng(0))):
+    for tick, sample in enumerate(simulate_measurements(still, ticks, np.random.default_rng(0))):
         chief = sample.measurement.chief_state
         if last is not None:
-            leg = Leg(
-                last.measurement.chief_state, chief, np.zeros(3), parameters.tick, substeps(parameters.tick)
-            )
+            leg = Interval(last.measurement.chief_state, chief, np.zeros(3), parameters.tick, substeps(parameters.tick))
             covariance = process.predict(leg, last.truth, covariance, noise)[1]
         rows = kernels.read_relative(sensors, chief, sample.truth)[1] / sigmas[:, None]
         gain = covariance @ rows.T @ np.linalg.inv(rows @ covariance @ rows.T + np.eye(len(rows)))
@@ -157,9 +153,7 @@ def consistency(directory: Path) -> tuple[str, list[Figure]]:
             name = f"{orbit}, {len(sensors)} sensors"
             k = len(sensors)
             rms = np.sqrt(np.mean(flown.error**2, axis=0))
-            ratio = np.sqrt(
-                np.mean(rms[ticks // 2 :] ** 2, axis=0) / np.mean(bound[ticks // 2 :] ** 2, axis=0)
-            )
+            ratio = np.sqrt(np.mean(rms[ticks // 2 :] ** 2, axis=0) / np.mean(bound[ticks // 2 :] ** 2, axis=0))
             share_nees, *nees_bounds = inside(flown.nees, 6)
             share_nis, *nis_bounds = inside(flown.nis, k)
             lagged = flown.innovation[:, 2:] * flown.innovation[:, 1:-1]
@@ -174,16 +168,12 @@ def consistency(directory: Path) -> tuple[str, list[Figure]]:
             )
             spread = 1.96 * sqrt(2.0 * 6.0 * RUNS) / RUNS
             figures += [
-                Figure(
-                    f"{name}: NEES at the end, mean of {RUNS} runs", "6", final, "", 6 - spread, 6 + spread
-                ),
+                Figure(f"{name}: NEES at the end, mean of {RUNS} runs", "6", final, "", 6 - spread, 6 + spread),
                 Figure(f"{name}: instants with NEES inside 95 %", "95 %", 100 * share_nees, "%", 80.0, 100.0),
                 Figure(f"{name}: instants with NIS inside 95 %", "95 %", 100 * share_nis, "%", 92.0, 98.0),
                 Figure(f"{name}: largest lag-1 correlation, in sigma", "below 3", white, "", 0.0, 3.0),
                 *(
-                    Figure(
-                        f"{name}: RMS error of {axis} over the bound", "1", float(ratio[i]), "", 0.85, 1.15
-                    )
+                    Figure(f"{name}: RMS error of {axis} over the bound", "1", float(ratio[i]), "", 0.85, 1.15)
                     for i, axis in enumerate(AXES)
                 ),
             ]
@@ -196,7 +186,12 @@ def consistency(directory: Path) -> tuple[str, list[Figure]]:
                 )
                 figures.append(
                     Figure(
-                        f"{name}: blind directions left", "0", float(flown.final.blind != ""), "", 0.0, 0.0
+                        f"{name}: unobservable directions left",
+                        "0",
+                        float(flown.final.unobservable != ""),
+                        "",
+                        0.0,
+                        0.0,
                     )
                 )
             _plot_campaign(
@@ -213,7 +208,7 @@ def consistency(directory: Path) -> tuple[str, list[Figure]]:
 {RUNS} flights each, over one orbit, from a fix of 50 m and 2 cm/s on each axis; 5 m, 1 cm/s, 1e-6 rad (and
 1e-6 rad of right ascension) every 10 s in LEO and every 120 s at GEO. Truth and filter have the same process
 noise, 1e-10 and 1e-14 m^2/s^3. NEES should be 6, NIS the number of readings; dashed in the plots are the
-two-sided 95 % bounds of the mean over the runs. NEES changes slowly, and what the fix left along the blind
+two-sided 95 % bounds of the mean over the runs. NEES changes slowly, and what the fix left along the unobservable
 direction stays in it, so that its instants are inside or outside together; NIS is new at every instant. RMS
 error at the end, over the runs, beside the posterior Cramer-Rao bound, m.
 
@@ -226,7 +221,7 @@ error at the end, over the runs, beside the posterior Cramer-Rao bound, m.
 ![GEO, three sensors](navigation_geo_3.png)
 ![GEO, with right ascension](navigation_geo_4.png)
 
-## The blind direction
+## The unobservable direction
 
 With three sensors, the errors of the {RUNS} runs at the end of the orbit lie along one direction (their
 largest principal component, rates divided by the mean motion), which should be the predicted one, a turn of
@@ -245,15 +240,15 @@ def _blind(parameters: NavigationParameters, flown: Campaign, name: str, rows: l
     rate = 2.0 * np.pi / orbit_period(flown.chief)
     scaled = flown.error[:, -1] / np.repeat([1.0, rate], 3)
     principal = np.linalg.svd(scaled - scaled.mean(axis=0))[2][0]
-    cosine = float(abs(principal @ predicted_blind_direction(flown.chief)))
+    cosine = float(abs(principal @ predicted_unobservable_direction(flown.chief)))
     # The angle of the turn that best explains an error, by the covariance at the start and at the end.
-    first = next(iter(rehearse(parameters, 1, np.random.default_rng(0)))).measurement.chief_state
+    first = next(iter(simulate_measurements(parameters, 1, np.random.default_rng(0)))).measurement.chief_state
     covariance = np.diag(np.repeat([parameters.fix_position_sigma**2, parameters.fix_velocity_sigma**2], 3))
     start = np.std(_turn(first, covariance, parameters, RUNS))
     end = np.std(_angle(flown.error[:, -1], flown.chief, flown.final.covariance))
-    rows.append(f"| {name} | {cosine:.6f} | {end / start:.3f} | {flown.final.blind} |")
+    rows.append(f"| {name} | {cosine:.6f} | {end / start:.3f} | {flown.final.unobservable} |")
     return [
-        Figure(f"{name}: cosine to the predicted blind direction", "1", cosine, "", 0.99, 1.0 + 1e-9),
+        Figure(f"{name}: cosine to the predicted unobservable direction", "1", cosine, "", 0.99, 1.0 + 1e-9),
         Figure(f"{name}: error along it over its start", "1", float(end / start), "", 0.9, 1.1),
     ]
 
@@ -261,7 +256,7 @@ def _blind(parameters: NavigationParameters, flown: Campaign, name: str, rows: l
 def _turn(chief: Array, covariance: Array, parameters: NavigationParameters, runs: int) -> Array:
     errors = []
     for run in range(runs):
-        sample = next(iter(rehearse(parameters, 1, np.random.default_rng([4, run]))))
+        sample = next(iter(simulate_measurements(parameters, 1, np.random.default_rng([4, run]))))
         errors.append(sample.measurement.fix - sample.truth)
     return _angle(np.array(errors), chief, covariance)
 
@@ -309,13 +304,11 @@ def _plot_campaign(
 
 def neokleous(directory: Path) -> tuple[str, list[Figure]]:
     """Figs. 3.3 to 3.6: measured and estimated x, y, z and radius at GEO, with his pseudo-measurements."""
-    parameters = NavigationParameters(
-        chief=GEO, tick=6.0, pseudo_measurements=True, acceleration_density=1e-14, **WIDE
-    )
+    parameters = NavigationParameters(chief=GEO, tick=6.0, pseudo_measurements=True, acceleration_density=1e-14, **WIDE)
     start = np.array([500.0, 1000.0, 300.0, 0.0, -2.0 * 7.292e-5 * 500.0, 0.0])
     filter = navigator(parameters)
     truth, state, sigma, radius = [], [], [], []
-    for sample in rehearse(parameters, 10000, np.random.default_rng(33), start=start):
+    for sample in simulate_measurements(parameters, 10000, np.random.default_rng(33), start=start):
         estimate = filter.on_tick(sample.measurement)
         assert estimate is not None
         truth.append(sample.truth)
@@ -435,16 +428,14 @@ def fourth_sensors() -> tuple[str, list[Figure]]:
         errors, squares = [], []
         for run in range(10):
             filter = navigator(replace(truth, **changes))
-            for tick, sample in enumerate(rehearse(truth, 400, np.random.default_rng([6, run]))):
+            for tick, sample in enumerate(simulate_measurements(truth, 400, np.random.default_rng([6, run]))):
                 estimate = filter.on_tick(sample.measurement)
                 assert estimate is not None
                 if tick >= 200:
                     errors.append(estimate.relative_state - sample.truth)
                     squares.append(nees(estimate, sample.truth))
         rms = np.sqrt(np.mean(np.square(errors), axis=0))
-        table.append(
-            f"| {name} | " + " | ".join(f"{each:.3f}" for each in rms[:3]) + f" | {np.mean(squares):.2f} |"
-        )
+        table.append(f"| {name} | " + " | ".join(f"{each:.3f}" for each in rms[:3]) + f" | {np.mean(squares):.2f} |")
         # Ten runs of 200 correlated ticks: the mean NEES of a right model is known to about one.
         figures.append(Figure(f"{name}: NEES, 10 runs", "6", float(np.mean(squares)), "", 1.0, 8.0))
     text = f"""## What a fourth measurement buys
@@ -455,7 +446,7 @@ Cramer-Rao bound after one orbit, with 1e-6 rad of right ascension or 1 m of ran
 |---|---|---|---|---|---|---|---|
 {chr(10).join(rows)}
 
-The range to the chief sees the blind direction only through the geometry of the relative orbit: at 90 m it
+The range to the chief sees the unobservable direction only through the geometry of the relative orbit: at 90 m it
 tells mostly of the along-track distance.
 
 ## Filters and process models
@@ -480,7 +471,7 @@ def troubles(directory: Path) -> tuple[str, list[Figure]]:
         rng = np.random.default_rng([5, run])
         filter = navigator(parameters)
         error, sigma = np.empty((ticks, 6)), np.empty((ticks, 6))
-        for tick, sample in enumerate(rehearse(parameters, ticks, np.random.default_rng([7, run]))):
+        for tick, sample in enumerate(simulate_measurements(parameters, ticks, np.random.default_rng([7, run]))):
             spoilt, outliers = _spoil(sample.measurement, parameters, rng, outage.start <= tick < outage.stop)
             planted += outliers
             estimate = filter.on_tick(spoilt)
@@ -489,7 +480,7 @@ def troubles(directory: Path) -> tuple[str, list[Figure]]:
             sigma[tick] = np.sqrt(np.diag(estimate.covariance))
             squares.append(nees(estimate, sample.truth))
             statuses.append(estimate.status)
-        counted += int(estimate.refusals[Refusal.GATE])
+        counted += int(estimate.rejections[Rejection.GATE])
         within.append(np.mean(np.abs(error) <= 3.0 * sigma))
         after.append(np.abs(error[outage.stop + 30, :3] / sigma[outage.stop + 30, :3]).max())
         if run == 0:
@@ -501,7 +492,7 @@ def troubles(directory: Path) -> tuple[str, list[Figure]]:
 LEO over two orbits, 20 flights: 30 % of the readings are lost, none arrives for ten minutes, and 1 % of those
 that arrive are off by 50 standard deviations.
 
-| outliers | refused by gates | ticks diverged | NEES | errors within 3 sigma | largest 5 min later |
+| outliers | rejected by gates | ticks diverged | NEES | errors within 3 sigma | largest 5 min later |
 |---|---|---|---|---|---|
 | {planted} | {counted} | {diverged} | {np.mean(squares):.2f} | {share:.2f} % | {max(after):.2f} |
 
@@ -509,7 +500,7 @@ that arrive are off by 50 standard deviations.
 
 """
     return text, [
-        Figure("troubles: readings refused over outliers", "1", counted / planted, "", 0.999, 1.01),
+        Figure("troubles: readings rejected over outliers", "1", counted / planted, "", 0.999, 1.01),
         Figure("troubles: ticks called diverged", "0", float(diverged), "", 0.0, 0.0),
         Figure("troubles: errors within 3 sigma", "99.7 %", share, "%", 98.5, 100.0),
         Figure(
@@ -581,10 +572,7 @@ def closed_loop(directory: Path) -> tuple[str, list[Figure]]:
         delta_v = np.abs(np.array(records["thrust"])).sum() * scenario.plant.tick / 100.0
         results[name] = error, delta_v
     orbit = round(2.0 * np.pi / scenario.plant.mean_motion / scenario.plant.tick)
-    rms = {
-        name: np.sqrt(np.mean(np.sum(error[-orbit:, :3] ** 2, axis=1)))
-        for name, (error, _) in results.items()
-    }
+    rms = {name: np.sqrt(np.mean(np.sum(error[-orbit:, :3] ** 2, axis=1))) for name, (error, _) in results.items()}
     figure, axis = plt.subplots(figsize=(8, 3.5), constrained_layout=True)
     for name, (error, _) in results.items():
         distance = np.linalg.norm(error[:, :3], axis=1)
@@ -606,7 +594,7 @@ The default scenario, three orbits, flown by the LQR on estimates only and on th
 
 ![Closed loop](navigation_closed_loop.png)
 
-What the filter adds is its own error, most of it along the blind direction, where the fix left half a metre.
+What the filter adds is its own error, most of it along the unobservable direction, where the fix left half a metre.
 
 """
     return text, [

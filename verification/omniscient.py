@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from formation_gnc.interface import Estimate, EstimateStatus, Measurement
 from formation_gnc.plant.plant import Plant
+from formation_gnc.records import Estimate, EstimateStatus, Measurement
 
 
 class Omniscient:

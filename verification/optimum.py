@@ -124,9 +124,7 @@ def regulated(field: Field, start: Array, goal: Array, duration: float, tau: flo
     Raises:
         RuntimeError: collocation does not converge.
     """
-    flight = solve_ivp(
-        field.rate, (0.0, duration), goal, method="DOP853", rtol=1e-13, atol=1e-9, dense_output=True
-    ).sol
+    flight = solve_ivp(field.rate, (0.0, duration), goal, method="DOP853", rtol=1e-13, atol=1e-9, dense_output=True).sol
     size = float(np.linalg.norm((start - goal)[:3]))
     first = (start - goal) / size * np.repeat([1.0, tau], 3)
 
@@ -140,7 +138,5 @@ def regulated(field: Field, start: Array, goal: Array, duration: float, tau: flo
     moments = np.linspace(0.0, duration / tau, 201)
     guess = np.concatenate([np.outer(first, np.exp(-moments)), np.zeros((6, len(moments)))])
     fine = np.linspace(0.0, duration / tau, 20_001)
-    path = collocated(
-        rate, lambda begin, end: np.concatenate([begin[:6] - first, end[6:]]), moments, guess, 1e-7, fine
-    )
+    path = collocated(rate, lambda begin, end: np.concatenate([begin[:6] - first, end[6:]]), moments, guess, 1e-7, fine)
     return size**2 / tau**3 * float(np.trapezoid(np.sum(path[:3] ** 2 + path[9:] ** 2, axis=0), fine))

@@ -115,14 +115,10 @@ def roberts(directory: Path) -> tuple[str, list[Figure]]:
                 Figure("Fig. 7a, Hill, radial", "0.5 m", hill[0], "m", 0.475, 0.525),
                 Figure("Fig. 7a, Hill, along-track", "over 1 m", hill[1], "m", 1.0, 1.1),
                 Figure("Fig. 7b, averaged, radial", "approximately 6.5 cm", 100 * average[0], "cm", 6.0, 7.0),
-                Figure(
-                    "Fig. 7b, averaged, along-track", "just over 30 cm", 100 * average[1], "cm", 30.0, 35.0
-                ),
+                Figure("Fig. 7b, averaged, along-track", "just over 30 cm", 100 * average[1], "cm", 30.0, 35.0),
                 Figure("Fig. 7, cross-track of the truth", "just 2 cm", 100 * average[2], "cm", 1.5, 2.5),
                 Figure("Fig. 10, radial over Hill's", "worse (above 1)", varying[0] / hill[0], "", 1.0, 10.0),
-                Figure(
-                    "Fig. 10, along-track over Hill's", "worse (above 1)", varying[1] / hill[1], "", 1.0, 10.0
-                ),
+                Figure("Fig. 10, along-track over Hill's", "worse (above 1)", varying[1] / hill[1], "", 1.0, 10.0),
             ]
         else:
             shape = np.corrcoef(truth[:, 0], truth[:, 0] + errors["time-varying J2"][:, 0])[0, 1]
@@ -204,9 +200,7 @@ SHAPE = np.array([0.5, 1.0, 0.5, 0.0, 0.0, 0.0])
 """Position of the deputy, in units of the separation; at rest across the track, without drift along it."""
 
 
-def largest_errors(
-    elements: Elements, reference: CircularReference, separations: Sequence[float]
-) -> dict[str, Array]:
+def largest_errors(elements: Elements, reference: CircularReference, separations: Sequence[float]) -> dict[str, Array]:
     """Largest position error (m) over five orbits of each model, for each separation (m)."""
     models = models_about(elements, reference)
     truth = models["nonlinear with J2"]
@@ -238,9 +232,7 @@ def all_models(directory: Path) -> tuple[str, list[Figure]]:
     by_separation = largest_errors(elements_from_state(start), circular, separations.tolist())
     sweeps = []
     for e in eccentricities:
-        orbit = Elements(
-            perigee / (1.0 - e), float(e), inclination, 0.0, math.radians(30.0), math.radians(20.0)
-        )
+        orbit = Elements(perigee / (1.0 - e), float(e), inclination, 0.0, math.radians(30.0), math.radians(20.0))
         sweeps.append(largest_errors(orbit, CircularReference.of(orbit), [1e3]))
     by_eccentricity = {name: np.array([sweep[name][0] for sweep in sweeps]) for name in by_separation}
 
@@ -308,9 +300,7 @@ def all_models(directory: Path) -> tuple[str, list[Figure]]:
     for name, values in by_separation.items():
         left.loglog(separations, values, marker=".", label=name)
         right.loglog(eccentricities, by_eccentricity[name], marker=".", label=name)
-    left.set(
-        xlabel="separation, m (circular chief)", ylabel=f"largest position error over {ORBITS} orbits, m"
-    )
+    left.set(xlabel="separation, m (circular chief)", ylabel=f"largest position error over {ORBITS} orbits, m")
     right.set(xlabel="eccentricity (separation 1 km)")
     for chart in (left, right):
         chart.grid(alpha=0.3, which="both")

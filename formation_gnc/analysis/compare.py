@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from formation_gnc.analysis.flown import POINTS
 from formation_gnc.analysis.metrics import deputies_of, figures, trajectory
-from formation_gnc.interface import Vector
+from formation_gnc.analysis.run_history import POINTS
 from formation_gnc.recording.reader import Bag
+from formation_gnc.types import Vector
 
 OF_WALL_TIME = "formation_gnc_msgs/msg/Timing"
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.interface import Matrix, Vector
 from formation_gnc.recording.reader import Bag
+from formation_gnc.types import Matrix, Vector
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,12 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from formation_gnc.analysis.flown import AXES, Flown, FlownDeputy
+from formation_gnc.analysis.run_history import AXES, DeputyHistory, RunHistory
 
 COLOURS = ("tab:blue", "tab:orange", "tab:green")
 
 
-def draw_overview(flown: Flown, path: Path, title: str) -> Path:
+def draw_overview(flown: RunHistory, path: Path, title: str) -> Path:
     """Draw four panels for every deputy: path, control error, estimation error with 3 sigma, thrust.
 
     Returns:
@@ -32,7 +32,7 @@ def draw_overview(flown: Flown, path: Path, title: str) -> Path:
     return path
 
 
-def draw_panels(flown: Flown, directory: Path) -> list[Path]:
+def draw_panels(flown: RunHistory, directory: Path) -> list[Path]:
     """Draw each panel of the overview for itself, as `DEPUTY_PANEL.png`.
 
     Returns:
@@ -49,7 +49,7 @@ def draw_panels(flown: Flown, directory: Path) -> list[Path]:
     return paths
 
 
-def _draw_path(axes: Any, flown: FlownDeputy) -> None:
+def _draw_path(axes: Any, flown: DeputyHistory) -> None:
     axes.plot(flown.truth[:, 1], flown.truth[:, 0], color="tab:blue", lw=1.2, label="true path")
     axes.plot(flown.target[:, 1], flown.target[:, 0], color="tab:red", lw=1.0, ls="--", label="target")
     axes.plot(*flown.truth[0, [1, 0]], "o", color="tab:blue", ms=5, label="start")
@@ -66,7 +66,7 @@ def _draw_path(axes: Any, flown: FlownDeputy) -> None:
     axes.grid(alpha=0.3)
 
 
-def _draw_error(axes: Any, flown: FlownDeputy) -> None:
+def _draw_error(axes: Any, flown: DeputyHistory) -> None:
     hours, error = flown.control_time, flown.control[:, :3]
     for axis, (label, colour) in enumerate(zip(AXES, COLOURS, strict=True)):
         axes.plot(hours, np.abs(error[:, axis]), color=colour, lw=0.7, label=label)
@@ -79,7 +79,7 @@ def _draw_error(axes: Any, flown: FlownDeputy) -> None:
     axes.grid(alpha=0.3)
 
 
-def _draw_estimation(axes: Any, flown: FlownDeputy) -> None:
+def _draw_estimation(axes: Any, flown: DeputyHistory) -> None:
     for axis, (label, colour) in enumerate(zip(AXES, COLOURS, strict=True)):
         axes.plot(flown.error_time, flown.error[:, axis], color=colour, lw=1.0, label=label)
         for sign in (-3.0, 3.0):
@@ -93,12 +93,10 @@ def _draw_estimation(axes: Any, flown: FlownDeputy) -> None:
     axes.grid(alpha=0.3)
 
 
-def _draw_thrust(axes: Any, flown: FlownDeputy) -> None:
+def _draw_thrust(axes: Any, flown: DeputyHistory) -> None:
     for axis, (label, colour) in enumerate(zip(AXES, COLOURS, strict=True)):
         axes.plot(flown.time, 1e6 * flown.acceleration[:, axis], color=colour, lw=0.9, label=label)
-    axes.set(
-        xlabel="time [h]", ylabel="acceleration by thrust [um/s^2]", title="thrust and delta-v (grey, right)"
-    )
+    axes.set(xlabel="time [h]", ylabel="acceleration by thrust [um/s^2]", title="thrust and delta-v (grey, right)")
     spent = axes.twinx()
     spent.plot(flown.time, 1e3 * flown.delta_v, color="grey", lw=1.5)
     spent.set(ylabel="delta-v [mm/s]")

@@ -11,9 +11,10 @@ import plotly.graph_objects as go
 from plotly.colors import qualitative
 from plotly.subplots import make_subplots
 
-from formation_gnc.analysis.flown import AXES, Flown, FlownDeputy, Mark
-from formation_gnc.interface import Matrix, Sensor, Vector
+from formation_gnc.analysis.run_history import AXES, DeputyHistory, Mark, RunHistory
 from formation_gnc.recording.reader import Bag
+from formation_gnc.records import Sensor
+from formation_gnc.types import Matrix, Vector
 
 SLIDER_STEPS = 120
 TARGETS = 120
@@ -47,7 +48,7 @@ th { text-align: left; background: #f5f5f5 } details { margin: .4rem 0 } summary
 """
 
 
-def write_report(bag: Bag, flown: Flown, path: Path, title: str) -> Path:
+def write_report(bag: Bag, flown: RunHistory, path: Path, title: str) -> Path:
     """Write the page; it needs no network and no server.
 
     Returns:
@@ -79,7 +80,7 @@ def write_report(bag: Bag, flown: Flown, path: Path, title: str) -> Path:
     return path
 
 
-def _summary(flown: Flown, bag: Bag) -> dict[str, Any]:
+def _summary(flown: RunHistory, bag: Bag) -> dict[str, Any]:
     ticks = bag.topics["/truth"].count
     rows: dict[str, Any] = {"simulated time": f"{ticks * flown.ticks.tick_ns / 1e9:g} s", "ticks": ticks}
     rows |= {f"delta-v of {name}": f"{1e3 * each.spent:.3f} mm/s" for name, each in flown.deputies.items()}
@@ -93,7 +94,7 @@ def _summary(flown: Flown, bag: Bag) -> dict[str, Any]:
     return rows
 
 
-def _listed(flown: Flown) -> str:
+def _listed(flown: RunHistory) -> str:
     """All events in a table."""
     rows = "".join(
         f"<tr><td>{3600.0 * mark.time:.3f}</td>"
@@ -107,13 +108,13 @@ def _listed(flown: Flown) -> str:
     return f"<h2>Events</h2><table>{head}{rows}</table>{rest}"
 
 
-def _mark_colours(flown: Flown) -> dict[str, str]:
+def _mark_colours(flown: RunHistory) -> dict[str, str]:
     """A colour for every kind of event of the run."""
     others = zip((kind for kind in sorted(flown.counts) if kind not in MARK_COLOURS), cycle(OTHER_MARKS))
     return MARK_COLOURS | dict(others)
 
 
-def _trajectory(flown: Mapping[str, FlownDeputy]) -> go.Figure:
+def _trajectory(flown: Mapping[str, DeputyHistory]) -> go.Figure:
     """Paths and targets in the Hill frame, with a slider that moves every deputy along its path."""
     figure = go.Figure()
 
@@ -134,10 +135,7 @@ def _trajectory(flown: Mapping[str, FlownDeputy]) -> go.Figure:
     frames, steps = [], []
     for row in np.unique(np.linspace(0, len(first.time) - 1, SLIDER_STEPS).round().astype(int)):
         name = f"{3600.0 * first.time[row]:.0f}"
-        places = [
-            go.Scatter3d(x=[d.truth[row, 1]], y=[d.truth[row, 0]], z=[d.truth[row, 2]])
-            for d in flown.values()
-        ]
+        places = [go.Scatter3d(x=[d.truth[row, 1]], y=[d.truth[row, 0]], z=[d.truth[row, 2]]) for d in flown.values()]
         frames.append(go.Frame(name=name, data=places, traces=list(range(moving, moving + len(flown)))))
         now = {"mode": "immediate", "frame": {"duration": 0, "redraw": True}, "transition": {"duration": 0}}
         steps.append({"label": name, "method": "animate", "args": [[name], now]})
@@ -164,7 +162,7 @@ def _trajectory(flown: Mapping[str, FlownDeputy]) -> go.Figure:
     return figure
 
 
-def _distances(flown: Flown, colours: Mapping[str, str]) -> go.Figure:
+def _distances(flown: RunHistory, colours: Mapping[str, str]) -> go.Figure:
     figure = make_subplots(rows=1, cols=1)
     nearest = sorted(flown.distances, key=lambda pair: float(flown.distances[pair][:, 1].min()))[:PAIRS]
     for colour, pair in zip(cycle(FLEET), nearest):
@@ -177,7 +175,7 @@ def _distances(flown: Flown, colours: Mapping[str, str]) -> go.Figure:
     return figure
 
 
-def _history(deputy: FlownDeputy) -> go.Figure:
+def _history(deputy: DeputyHistory) -> go.Figure:
     rows = ["estimate - truth [m]", "estimate - truth [m/s]", "truth - target [m]", "thrust [µm/s²]"]
     rows.append("delta-v [mm/s]")
     if np.any(deputy.solver[:, 1]):
@@ -211,7 +209,7 @@ def _history(deputy: FlownDeputy) -> go.Figure:
     return figure
 
 
-def _readings(deputy: FlownDeputy) -> go.Figure:
+def _readings(deputy: DeputyHistory) -> go.Figure:
     sensors = sorted(deputy.readings.keys() | deputy.innovations.keys())
     count = max(1, len(sensors))
     figure = make_subplots(rows=count, cols=2, shared_xaxes="all", vertical_spacing=0.14 / count)
@@ -288,9 +286,7 @@ def _mark(
 
 
 def _section(title: str, figure: go.Figure, first: bool = False) -> str:
-    body = figure.to_html(
-        full_html=False, include_plotlyjs=first, auto_play=False, config={"displaylogo": False}
-    )
+    body = figure.to_html(full_html=False, include_plotlyjs=first, auto_play=False, config={"displaylogo": False})
     return f"<h2>{escape(title)}</h2>{body}"
 
 

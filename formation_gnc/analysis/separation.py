@@ -7,8 +7,8 @@ from itertools import combinations
 import numpy as np
 
 from formation_gnc.analysis.metrics import deputies_of
-from formation_gnc.interface import Matrix, Vector
 from formation_gnc.recording.reader import Bag
+from formation_gnc.types import Matrix, Vector
 
 
 @dataclass(frozen=True)

@@ -69,9 +69,7 @@ def _summary(
     }
 
 
-def _print(
-    paths: list[Path], figures: list[dict[str, dict[str, float]]], differences: list[list[Difference]]
-) -> None:
+def _print(paths: list[Path], figures: list[dict[str, dict[str, float]]], differences: list[list[Difference]]) -> None:
     console = Console(highlight=False)
     table = Table()
     table.add_column("figure")

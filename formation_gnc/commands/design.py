@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Design, draw, print."""
-    from formation_gnc.control.report import Design, design, draw
+    from formation_gnc.analysis.design_report import Design, design, draw
     from formation_gnc.sil.scenario import load_scenario
 
     if options.plot is not None and options.plot.suffix not in (".png", ".pdf", ".svg"):

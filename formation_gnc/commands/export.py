@@ -20,9 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--format", choices=("csv", "parquet"), default="csv", help="default: csv")
     parser.add_argument("--attachments", action="store_true", help="write the attached files too")
-    parser.add_argument(
-        "--output", metavar="DIR", type=Path, help="directory to write to (default: BAG_export)"
-    )
+    parser.add_argument("--output", metavar="DIR", type=Path, help="directory to write to (default: BAG_export)")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -44,11 +44,7 @@ def run(options: argparse.Namespace) -> int:
         node = f"/{deputy}/navigation"
         comparisons.append(compare(bag, deputy, given_to(options.params, node) if options.params else {}))
     if options.json:
-        print(
-            json.dumps(
-                {"bag": str(options.bag), "deputies": {c.deputy: as_json(c) for c in comparisons}}, indent=2
-            )
-        )
+        print(json.dumps({"bag": str(options.bag), "deputies": {c.deputy: as_json(c) for c in comparisons}}, indent=2))
         return 0
     console = Console(highlight=False)
     for comparison in comparisons:
@@ -75,8 +71,8 @@ def _table(comparison: Any) -> Table:
         "mean NEES (6 is consistent) [-]": [f"{each.mean_nees:.3f}" for each in sides.values()],
         "mean NIS [-]": [f"{each.mean_nis:.3f}" for each in sides.values()],
         "readings used": [f"{each.readings}" for each in sides.values()],
-        "refused": [
-            ", ".join(f"{reason} {count}" for reason, count in each.refusals.items()) or "none"
+        "rejected": [
+            ", ".join(f"{reason} {count}" for reason, count in each.rejections.items()) or "none"
             for each in sides.values()
         ],
     }

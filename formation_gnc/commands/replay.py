@@ -40,8 +40,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Replay, record, compare."""
-    from formation_gnc.nodes.record_in_process import InProcessRecorder, reader
     from formation_gnc.recording.writer import BagWriter
+    from formation_gnc.transport.in_process_recorder import InProcessRecorder, reader
 
     bag = Bag(options.recorded)
     parameters = {}

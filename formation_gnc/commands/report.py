@@ -14,25 +14,21 @@ from formation_gnc.recording.reader import Bag
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     parser.add_argument("bag", type=Path, help="bag directory or .mcap file")
-    parser.add_argument(
-        "--output", metavar="FILE", type=Path, help="page to write (default: report.html in the bag)"
-    )
-    parser.add_argument(
-        "--pictures", metavar="DIR", type=Path, help="directory for PNG files, for a README or a paper"
-    )
+    parser.add_argument("--output", metavar="FILE", type=Path, help="page to write (default: report.html in the bag)")
+    parser.add_argument("--pictures", metavar="DIR", type=Path, help="directory for PNG files, for a README or a paper")
 
 
 def run(options: argparse.Namespace) -> int:
     """Read, draw, write."""
-    from formation_gnc.analysis.flown import Flown
     from formation_gnc.analysis.overview import draw_overview, draw_panels
     from formation_gnc.analysis.report import write_report
+    from formation_gnc.analysis.run_history import RunHistory
 
     bag = Bag(options.bag)
     title = options.bag.absolute().name
     directory = options.bag if options.bag.is_dir() else options.bag.parent
     page = options.output or directory / "report.html"
-    flown = Flown(bag)
+    flown = RunHistory(bag)
     try:
         write_report(bag, flown, page, title)
         print(f"report: {page}")

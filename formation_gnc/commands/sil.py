@@ -28,9 +28,7 @@ from formation_gnc.sil.scenario import Scenario, duration_of, load_scenario
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     parser.add_argument("scenario", help="name of a scenario in params/, or a ROS 2 parameter file")
-    parser.add_argument(
-        "--controller", metavar="NAME", help=f"control law of every deputy: {', '.join(ALGORITHMS)}"
-    )
+    parser.add_argument("--controller", metavar="NAME", help=f"control law of every deputy: {', '.join(ALGORITHMS)}")
     length = parser.add_mutually_exclusive_group()
     length.add_argument("--duration", metavar="S", type=float, help="simulated seconds to fly")
     length.add_argument("--orbits", metavar="N", type=float, help="orbits of the chief to fly")
@@ -42,9 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="simulated seconds per wall second at most; 0: no limit",
     )
     where = parser.add_mutually_exclusive_group()
-    where.add_argument(
-        "--in-process", action="store_true", help="fly in this process, without the node graph"
-    )
+    where.add_argument("--in-process", action="store_true", help="fly in this process, without the node graph")
     where.add_argument(
         "--composed", action="store_true", help="one process for each satellite, not for each of its nodes"
     )
@@ -142,9 +138,9 @@ class _Display:
 
 
 def _fly_on_graph(scenario: Scenario, bag: Path, console: Console, composed: bool, display: bool) -> float:
-    from formation_gnc.nodes.launcher import Report, fly_graph
+    from formation_gnc.transport.launcher import Report, fly_graph
 
-    Run(scenario)  # what cannot be flown is refused before anything starts
+    Run(scenario)  # what cannot be flown is rejected before anything starts
 
     def show(report: Report) -> None:
         shown.show(report.message, report.figures.get("tick", 0.0), report.figures.get("speedup", 0.0))
@@ -155,17 +151,15 @@ def _fly_on_graph(scenario: Scenario, bag: Path, console: Console, composed: boo
 
 
 def _fly_in_process(scenario: Scenario, bag: Path, console: Console) -> float:
-    from formation_gnc.nodes.record_in_process import InProcessRecorder
     from formation_gnc.recording.layout import LAYOUT, foxglove_layout
     from formation_gnc.recording.provenance import parameters_record, provenance
     from formation_gnc.recording.writer import BagWriter
+    from formation_gnc.transport.in_process_recorder import InProcessRecorder
 
     run = Run(scenario)
     tick, pace = scenario.plant.tick, scenario.plant.real_time_factor
     if pace:
-        raise ConfigurationError(
-            "real_time_factor: has no effect in-process; fly the node graph for a paced run"
-        )
+        raise ConfigurationError("real_time_factor: has no effect in-process; fly the node graph for a paced run")
     parameters = {
         parameters_record(node): {name: json.dumps(value) for name, value in values.items()}
         for node, values in scenario.parameters().items()
@@ -188,14 +182,14 @@ def _fly_in_process(scenario: Scenario, bag: Path, console: Console) -> float:
 
 
 def _summarise(scenario: Scenario, bag: Path, speedup: float, as_json: bool) -> int:
-    from formation_gnc.analysis.flown import Flown
     from formation_gnc.analysis.metrics import figures
     from formation_gnc.analysis.overview import draw_overview
+    from formation_gnc.analysis.run_history import RunHistory
     from formation_gnc.analysis.separation import predicted_approach
     from formation_gnc.recording.reader import Bag
 
     recorded = Bag(bag)
-    result, flown = figures(recorded), Flown(recorded)
+    result, flown = figures(recorded), RunHistory(recorded)
     separations = {
         "minimum separation": flown.nearest,
         "least predicted on target": predicted_approach(recorded, "planned"),

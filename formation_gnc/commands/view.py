@@ -34,8 +34,8 @@ def run(options: argparse.Namespace) -> int:
         from formation_gnc.recording.live import LiveView, Player
     except ImportError:
         raise ConfigurationError("foxglove-sdk is not installed: pip install foxglove-sdk") from None
-    from formation_gnc.nodes.viewer import show_graph
     from formation_gnc.recording.reader import Bag
+    from formation_gnc.transport.viewer import show_graph
 
     player = Player(Bag(options.bag), options.port, options.layout, options.rate) if options.bag else None
     view = player.view if player else LiveView("formation_gnc", options.port, options.layout)

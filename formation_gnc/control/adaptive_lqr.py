@@ -6,16 +6,17 @@ from typing import Any
 
 import numpy as np
 
+from formation_gnc.common import CommonParameters
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
 from formation_gnc.control.finite_horizon import leaps
 from formation_gnc.control.networks import Networks, Regulator, functions
 from formation_gnc.control.riccati import Weights, continuous_cost_to_go
 from formation_gnc.control.weights import QuadraticWeights
 from formation_gnc.errors import DesignError
-from formation_gnc.interface import NANOSECONDS, NavigationState, Target, Vector
-from formation_gnc.mission import Mission
 from formation_gnc.parameters import parameter
+from formation_gnc.records import NavigationState, Target
 from formation_gnc.relative.hill import HillModel
+from formation_gnc.types import NANOSECONDS, Vector
 
 LARGEST_WEIGHT = 1e6
 """Of a network; beyond it the network counts as blown up: its units make weights of order one."""
@@ -68,25 +69,25 @@ class AdaptiveLinearQuadraticRegulator(Controller):
 
     Parameters = AdaptiveLqrParameters
 
-    def __init__(self, parameters: AdaptiveLqrParameters, mission: Mission, vehicle: Vehicle) -> None:
+    def __init__(self, parameters: AdaptiveLqrParameters, common: CommonParameters, vehicle: Vehicle) -> None:
         """Solve for the regulator.
 
         Raises:
             DesignError: inadmissible weights, no stabilising solution, or learning too brisk for the tick.
         """
-        if parameters.identification_time < FEWEST_TICKS * mission.tick:
+        if parameters.identification_time < FEWEST_TICKS * common.tick:
             raise DesignError(
                 f"adaptive_lqr: identification_time is {parameters.identification_time} s; "
-                f"it must be at least {FEWEST_TICKS} ticks of {mission.tick} s"
+                f"it must be at least {FEWEST_TICKS} ticks of {common.tick} s"
             )
-        model, orbit = HillModel(mission.mean_motion), mission.chief
-        self._tick = mission.tick
+        model, orbit = HillModel(common.mean_motion), common.chief
+        self._tick = common.tick
         self._limit, self._mass = vehicle.thrust_limit, vehicle.mass
         self._rate, self._latitude = model.mean_motion, orbit.argument_of_perigee + orbit.true_anomaly
         self._radius = orbit.semi_major_axis / parameters.reach
         try:
             weights = Weights.scaled(
-                parameters.state_matrix(), vehicle.mass**2 * parameters.thrust_matrix(), mission.tick
+                parameters.state_matrix(), vehicle.mass**2 * parameters.thrust_matrix(), common.tick
             )
             cost_to_go, _ = continuous_cost_to_go(model.dynamics(0.0), model.INPUT, weights)
         except DesignError as error:
@@ -94,14 +95,10 @@ class AdaptiveLinearQuadraticRegulator(Controller):
         self._pace = math.sqrt(weights.input_unit[0])
         self._state_unit = parameters.reach * weights.state_unit
         self._input_unit = parameters.reach * weights.input_unit
-        self.cost_to_go = (
-            weights.cost_unit / self._pace * cost_to_go / np.outer(weights.state_unit, weights.state_unit)
-        )
+        self.cost_to_go = weights.cost_unit / self._pace * cost_to_go / np.outer(weights.state_unit, weights.state_unit)
         dynamics = weights.step(model.dynamics(0.0), model.INPUT)[0] / self._pace
         self._regulator = Regulator(dynamics, weights.state, weights.input, cost_to_go)
-        self.networks = Networks(
-            self._regulator, parameters.identification_time * self._pace, parameters.inertia
-        )
+        self.networks = Networks(self._regulator, parameters.identification_time * self._pace, parameters.inertia)
         self._target: Target | None = None
         self._failure = ""
 
@@ -115,7 +112,7 @@ class AdaptiveLinearQuadraticRegulator(Controller):
             "network weights": sum(each.size for each in networks),
         }
 
-    def take_over(self, handover: Handover) -> None:
+    def activate(self, handover: Handover) -> None:
         """Go on with what a law of the same kind and reach has learnt."""
         before = handover.law
         if (

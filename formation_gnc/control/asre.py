@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from formation_gnc.control.finite_horizon import Plan, Task
+from formation_gnc.control.fixed_endpoint_lq import Cost, approximating_sequence, state_dependent
 from formation_gnc.control.sdre_finite import FiniteSdre, SdreFiniteParameters
-from formation_gnc.control.steering import Cost, approximating_sequence, state_dependent
 from formation_gnc.parameters import parameter
 
 TOLERANCE = 1e-6
@@ -38,9 +38,7 @@ class Asre(FiniteSdre):
         """Solve linear problems until the way stays what it was."""
         times = np.asarray(task.time + 0.5 * task.step * np.arange(2 * task.steps + 1))
         change = task.goal - task.state
-        distance = max(
-            float(np.linalg.norm(change[:3])), task.duration * float(np.linalg.norm(change[3:])), 1.0
-        )
+        distance = max(float(np.linalg.norm(change[:3])), task.duration * float(np.linalg.norm(change[3:])), 1.0)
         sequence = approximating_sequence(
             state_dependent(task.model, self._parameters.factorisation, times),
             task.state + np.linspace(0.0, 1.0, task.steps + 1)[:, None] * change,
@@ -53,7 +51,5 @@ class Asre(FiniteSdre):
         )
         failure = ""
         if not sequence.converged:
-            failure = (
-                f"not converged in {len(sequence.changes)} iterations: {sequence.changes[-1]:.1e} is left"
-            )
+            failure = f"not converged in {len(sequence.changes)} iterations: {sequence.changes[-1]:.1e} is left"
         return Plan(sequence.steering.inputs, task.duration, len(sequence.changes), failure)

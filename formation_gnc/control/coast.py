@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from formation_gnc.common import CommonParameters
 from formation_gnc.control.controller import Command, Controller, Vehicle
-from formation_gnc.interface import NavigationState, Target
-from formation_gnc.mission import Mission
+from formation_gnc.records import NavigationState, Target
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Coast(Controller):
 
     Parameters = CoastParameters
 
-    def __init__(self, parameters: CoastParameters, mission: Mission, vehicle: Vehicle) -> None:
+    def __init__(self, parameters: CoastParameters, common: CommonParameters, vehicle: Vehicle) -> None:
         """Nothing to design."""
 
     def command(self, estimate: NavigationState, target: Target) -> Command:

@@ -4,9 +4,10 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from formation_gnc.common import CommonParameters
 from formation_gnc.control.linear import LinearController
-from formation_gnc.interface import Matrix, NavigationState, Target, Vector
-from formation_gnc.mission import Mission
+from formation_gnc.records import NavigationState, Target
+from formation_gnc.types import Matrix, Vector
 
 
 @dataclass(slots=True)
@@ -57,14 +58,14 @@ class Controller(ABC):
     Parameters: ClassVar[type]
 
     @abstractmethod
-    def __init__(self, parameters: Any, mission: Mission, vehicle: Vehicle) -> None:
+    def __init__(self, parameters: Any, common: CommonParameters, vehicle: Vehicle) -> None:
         """Design the law; may be slow.
 
         Raises:
             DesignError: no law follows from these parameters; the message says why.
         """
 
-    def take_over(self, handover: Handover) -> None:  # noqa: B027 - a law without memory has nothing to take over
+    def activate(self, handover: Handover) -> None:  # noqa: B027 - a law without memory has nothing to take over
         """Start from what flew before; called once, before the first `command`."""
 
     @abstractmethod

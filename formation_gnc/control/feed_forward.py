@@ -4,10 +4,11 @@ from math import ceil
 
 import numpy as np
 
-from formation_gnc.interface import NANOSECONDS, Matrix, NavigationState, Target, Vector
 from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
 from formation_gnc.orbit.propagation import advance_with_transition
+from formation_gnc.records import NavigationState, Target
 from formation_gnc.relative.model import NO_THRUST, RelativeModel
+from formation_gnc.types import NANOSECONDS, Matrix, Vector
 
 LONGEST_STEP = 60.0
 """Integration step, s: of order eight, far below a millimetre per step."""

@@ -9,18 +9,19 @@ from typing import Any
 import numpy as np
 from numpy.linalg import LinAlgError
 
+from formation_gnc.common import CommonParameters
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
 from formation_gnc.control.lqr import LinearQuadraticRegulator, LqrParameters
 from formation_gnc.control.weights import QuadraticWeights
 from formation_gnc.errors import ConfigurationError, DesignError
-from formation_gnc.interface import NANOSECONDS, Matrix, NavigationState, Target, Vector
-from formation_gnc.mission import Mission
 from formation_gnc.orbit.elements import Elements, elements_from_state
 from formation_gnc.parameters import parameter
+from formation_gnc.records import NavigationState, Target
 from formation_gnc.relative.chief import KeplerChief, OblateChief
 from formation_gnc.relative.model import RelativeModel, integrate
 from formation_gnc.relative.nonlinear import NonlinearModel
 from formation_gnc.relative.oblate import OblateModel
+from formation_gnc.types import NANOSECONDS, Matrix, Vector
 
 PLAN_MODELS: dict[str, Callable[[Elements], RelativeModel]] = {
     "nonlinear": lambda chief: NonlinearModel(KeplerChief.of(chief)),
@@ -183,14 +184,14 @@ class FiniteHorizonController(Controller):
     subclass of `FiniteHorizonParameters`.
     """
 
-    def __init__(self, parameters: Any, mission: Mission, vehicle: Vehicle) -> None:
+    def __init__(self, parameters: Any, common: CommonParameters, vehicle: Vehicle) -> None:
         """Design the law that holds.
 
         Raises:
             DesignError: a plan of too many steps, or weights that LQR cannot take.
         """
         self._parameters = parameters
-        self._tick = mission.tick
+        self._tick = common.tick
         self._limit = vehicle.thrust_limit
         if parameters.final_time > MOST_STEPS * parameters.step:
             raise DesignError(
@@ -198,7 +199,7 @@ class FiniteHorizonController(Controller):
                 f"it must be at most {MOST_STEPS} steps"
             )
         holding = LqrParameters(feed_forward=parameters.feed_forward, **parameters.weights())
-        self.holding = LinearQuadraticRegulator(holding, mission, vehicle)
+        self.holding = LinearQuadraticRegulator(holding, common, vehicle)
         self._effort = vehicle.mass**2 * parameters.thrust_matrix() / parameters.final_time
         self._effort[np.diag_indices(3)] += np.where(vehicle.thrust_limit > 0.0, 0.0, np.inf)
         self._slack = np.zeros((6, 6))
@@ -225,7 +226,7 @@ class FiniteHorizonController(Controller):
             **self.holding.figures(),
         }
 
-    def take_over(self, handover: Handover) -> None:
+    def activate(self, handover: Handover) -> None:
         """Go on with the reconfiguration of the same law with other parameters."""
         if type(handover.law) is type(self):
             self._flight, self._target = handover.law._flight, handover.law._target
@@ -237,9 +238,7 @@ class FiniteHorizonController(Controller):
         self._target = target
         flight = self._flight
         to_go = self._parameters.final_time - (estimate.time - flight.begin) / NANOSECONDS
-        new = (
-            self._try(flight, estimate, target, to_go) if self._is_due(flight, estimate.time, to_go) else None
-        )
+        new = self._try(flight, estimate, target, to_go) if self._is_due(flight, estimate.time, to_go) else None
         since = (estimate.time - flight.planned_at) / NANOSECONDS
         if flight.plan is None or to_go <= 0.0:
             held = self.holding.command(estimate, target)
@@ -284,9 +283,7 @@ class FiniteHorizonController(Controller):
             model = PLAN_MODELS[self._parameters.model](elements_from_state(estimate.chief_state))
             goal = target_after(target, to_go, model)
             plan = self.plan(
-                Task(
-                    model, 0.0, estimate.relative_state, goal, to_go, steps, guess, self._effort, self._slack
-                )
+                Task(model, 0.0, estimate.relative_state, goal, to_go, steps, guess, self._effort, self._slack)
             )
         except ConfigurationError as error:
             return Plan(nothing, to_go, 0, f"no plan: {error}")

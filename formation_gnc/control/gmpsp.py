@@ -3,7 +3,7 @@
 from formation_gnc.control.finite_horizon import Task
 from formation_gnc.control.mpsp import StaticProgrammingController, StaticProgrammingParameters
 from formation_gnc.control.static_programming import StaticPlan, gmpsp
-from formation_gnc.interface import Vector
+from formation_gnc.types import Vector
 
 
 class GmpspController(StaticProgrammingController):

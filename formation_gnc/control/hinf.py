@@ -6,15 +6,16 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag, solve_discrete_lyapunov
 
+from formation_gnc.common import CommonParameters
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
 from formation_gnc.control.linear import LinearController
 from formation_gnc.control.mixed_sensitivity import Problem, Weight
 from formation_gnc.control.models import DESIGN_MODELS
 from formation_gnc.control.riccati import spectral_radius
 from formation_gnc.errors import DesignError
-from formation_gnc.interface import Matrix, NavigationState, Target, Vector
-from formation_gnc.mission import Mission
 from formation_gnc.parameters import parameter
+from formation_gnc.records import NavigationState, Target
+from formation_gnc.types import Matrix, Vector
 
 
 @dataclass(frozen=True)
@@ -120,12 +121,10 @@ class HInfinityController(Controller):
 
     Parameters = HinfParameters
 
-    def __init__(self, parameters: HinfParameters, mission: Mission, vehicle: Vehicle) -> None:
+    def __init__(self, parameters: HinfParameters, common: CommonParameters, vehicle: Vehicle) -> None:
         """Synthesise; raises DesignError when no gamma is feasible or the sampled loop is not stable."""
-        model = DESIGN_MODELS[parameters.model](mission)
-        bounds = {
-            name: np.array(value) for name, value in vars(parameters).items() if isinstance(value, tuple)
-        }
+        model = DESIGN_MODELS[parameters.model](common)
+        bounds = {name: np.array(value) for name, value in vars(parameters).items() if isinstance(value, tuple)}
         self.problem = Problem(
             model.dynamics(0.0),
             Weight.performance(bounds["bandwidth"], bounds["sensitivity_peak"], bounds["steady_error"]),
@@ -141,8 +140,8 @@ class HInfinityController(Controller):
             self.continuous, self.best_gamma, self.gamma = self.problem.synthesise(
                 parameters.form == "full_information", parameters.gamma_margin
             )
-            self.sampled = self.continuous.discretised(mission.tick)
-            self._set_restart(*model.discretise(0.0, mission.tick))
+            self.sampled = self.continuous.discretised(common.tick)
+            self._set_restart(*model.discretise(0.0, common.tick))
         except DesignError as error:
             raise DesignError(f"hinf: {error}") from error
 
@@ -202,7 +201,7 @@ class HInfinityController(Controller):
             "gamma / w_u [N/m]": self._mass * self.gamma * effort,
         }
 
-    def take_over(self, handover: Handover) -> None:
+    def activate(self, handover: Handover) -> None:
         """Start from the force that flew before."""
         self._force = handover.force
 

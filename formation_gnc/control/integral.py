@@ -7,8 +7,8 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from formation_gnc.control.weights import QuadraticWeights
-from formation_gnc.interface import Matrix
 from formation_gnc.parameters import parameter
+from formation_gnc.types import Matrix
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
-from formation_gnc.interface import Matrix
+from formation_gnc.types import Matrix
 
 
 @dataclass(frozen=True)

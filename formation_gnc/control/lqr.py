@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from formation_gnc.common import CommonParameters
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
 from formation_gnc.control.feed_forward import FeedForward
 from formation_gnc.control.integral import IntegralWeights, integrated, with_integral
@@ -19,10 +20,10 @@ from formation_gnc.control.riccati import (
     stationary_gain,
 )
 from formation_gnc.errors import DesignError
-from formation_gnc.interface import NANOSECONDS, Matrix, NavigationState, Target
-from formation_gnc.mission import Mission
 from formation_gnc.parameters import parameter
+from formation_gnc.records import NavigationState, Target
 from formation_gnc.relative.model import RelativeModel
+from formation_gnc.types import NANOSECONDS, Matrix
 
 STRETCHES = 180
 """Stretches of an orbit (2 degrees each) over which a time-varying model is taken as constant in the
@@ -79,15 +80,15 @@ class LinearQuadraticRegulator(Controller):
 
     Parameters = LqrParameters
 
-    def __init__(self, parameters: LqrParameters, mission: Mission, vehicle: Vehicle) -> None:
+    def __init__(self, parameters: LqrParameters, common: CommonParameters, vehicle: Vehicle) -> None:
         """Solve for the gains.
 
         Raises:
             DesignError: inadmissible weights, a gain that the model does not have, or no stabilising
             solution.
         """
-        model = DESIGN_MODELS[parameters.model](mission)
-        self.tick = mission.tick
+        model = DESIGN_MODELS[parameters.model](common)
+        self.tick = common.tick
         self._limit, self._mass = vehicle.thrust_limit.tolist(), vehicle.mass
         self._integrates = parameters.integrates
         self._feed_forward = FeedForward(parameters.feed_forward, model)
@@ -95,9 +96,7 @@ class LinearQuadraticRegulator(Controller):
         self._start: int | None = None
         try:
             thrust_weight = vehicle.mass**2 * parameters.thrust_matrix()
-            self._design(
-                parameters, model, Weights.scaled(parameters.joint_matrix(), thrust_weight, self.tick)
-            )
+            self._design(parameters, model, Weights.scaled(parameters.joint_matrix(), thrust_weight, self.tick))
         except DesignError as error:
             raise DesignError(f"lqr: {error}") from error
 
@@ -124,9 +123,7 @@ class LinearQuadraticRegulator(Controller):
             self.gain = self.gains.mean(axis=0)
         elif parameters.gain == "continuous":
             matrices = model.dynamics(0.0), model.INPUT
-            self.gain = continuous_gain(
-                *(with_integral(*matrices) if self._integrates else matrices), weights
-            )
+            self.gain = continuous_gain(*(with_integral(*matrices) if self._integrates else matrices), weights)
         else:
             phi, gamma = self._discretise(model, 0.0)
             self.gain = stationary_gain(phi, gamma, weights)
@@ -170,7 +167,7 @@ class LinearQuadraticRegulator(Controller):
         inputs = self.tick * np.eye(len(integral), 6)
         return LinearController(integral, inputs, -gain[:, 6:], -gain[:, :6])
 
-    def take_over(self, handover: Handover) -> None:
+    def activate(self, handover: Handover) -> None:
         """Keep the integral of an LQR that flew before."""
         if self._integrates and isinstance(handover.law, LinearQuadraticRegulator):
             self._integral = handover.law._integral or self._integral

@@ -17,7 +17,7 @@ from scipy.linalg import solve_continuous_are
 
 from formation_gnc.control.linear import LinearController
 from formation_gnc.errors import DesignError
-from formation_gnc.interface import Matrix, Vector
+from formation_gnc.types import Matrix, Vector
 
 LARGEST_GAMMA = 1e6
 
@@ -159,9 +159,7 @@ class Problem:
         x = solve_continuous_are(a, b, c.T @ c, np.diag(price))
         feedback = -(b.T @ x) / effort[:, None] ** 2
         inputs = np.hstack([np.vstack([np.eye(3), np.eye(3)]), np.zeros((6, 3))])
-        controller = self._unscaled(
-            a[6:, 6:], inputs, feedback[:, 6:], feedback[:, :6], np.repeat([1.0, self.rate], 3)
-        )
+        controller = self._unscaled(a[6:, 6:], inputs, feedback[:, 6:], feedback[:, :6], np.repeat([1.0, self.rate], 3))
         return controller, best, gamma
 
     def _unscaled(self, a: Matrix, b: Matrix, c: Matrix, d: Matrix, unit: Vector) -> LinearController:
@@ -178,8 +176,7 @@ class Problem:
         for w in frequency:
             states = np.linalg.solve(1j * w * eye6 - self.dynamics, b)
             k = -(
-                controller.c
-                @ np.linalg.solve(1j * w * np.eye(len(controller.a)) - controller.a, controller.b)
+                controller.c @ np.linalg.solve(1j * w * np.eye(len(controller.a)) - controller.a, controller.b)
                 + controller.d
             )
             if len(seen) == 6:  # a disturbance of the position is one of its rate as well

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from formation_gnc.mission import Mission
+from formation_gnc.common import CommonParameters
 from formation_gnc.orbit.elements import Elements
 from formation_gnc.relative.chief import KeplerChief
 from formation_gnc.relative.hill import HillModel
@@ -11,13 +11,13 @@ from formation_gnc.relative.model import RelativeModel
 from formation_gnc.relative.schweighart_sedwick import CircularReference, SchweighartSedwickModel
 from formation_gnc.relative.tschauner_hempel import TschaunerHempelModel
 
-DESIGN_MODELS: dict[str, Callable[[Mission], RelativeModel]] = {
-    "hill": lambda mission: HillModel(mission.mean_motion),
-    "schweighart_sedwick": lambda mission: SchweighartSedwickModel(CircularReference.of(_elements(mission))),
-    "j2_gradient": lambda mission: J2GradientModel(CircularReference.of(_elements(mission))),
-    "tschauner_hempel": lambda mission: TschaunerHempelModel(KeplerChief.of(_elements(mission))),
+DESIGN_MODELS: dict[str, Callable[[CommonParameters], RelativeModel]] = {
+    "hill": lambda common: HillModel(common.mean_motion),
+    "schweighart_sedwick": lambda common: SchweighartSedwickModel(CircularReference.of(_elements(common))),
+    "j2_gradient": lambda common: J2GradientModel(CircularReference.of(_elements(common))),
+    "tschauner_hempel": lambda common: TschaunerHempelModel(KeplerChief.of(_elements(common))),
 }
 
 
-def _elements(mission: Mission) -> Elements:
-    return Elements(**vars(mission.chief))
+def _elements(common: CommonParameters) -> Elements:
+    return Elements(**vars(common.chief))

@@ -9,18 +9,19 @@ import osqp
 from numpy.typing import NDArray
 from scipy import sparse
 
+from formation_gnc.common import CommonParameters, Orbit
+from formation_gnc.control.condensed_qp import CondensedQp, facet_normals, facet_reach
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
 from formation_gnc.control.linear import LinearController
 from formation_gnc.control.lqr import STRETCHES, LinearQuadraticRegulator, LqrParameters
 from formation_gnc.control.models import DESIGN_MODELS
-from formation_gnc.control.programme import Programme, facet_normals, facet_reach
 from formation_gnc.control.riccati import Weights, periodic_cost_to_go
 from formation_gnc.control.weights import QuadraticWeights
 from formation_gnc.errors import DesignError
-from formation_gnc.interface import NANOSECONDS, NavigationState, Target, Vector
-from formation_gnc.mission import Mission, Orbit
 from formation_gnc.orbit.constants import EARTH_RADIUS, MU
 from formation_gnc.parameters import parameter
+from formation_gnc.records import NavigationState, Target
+from formation_gnc.types import NANOSECONDS, Vector
 
 ACCURACY = 1e-4
 """Residual at which OSQP stops, with force in units of the thrust limit."""
@@ -55,9 +56,7 @@ class MpcParameters(QuadraticWeights):
         "hill", choices=tuple(DESIGN_MODELS), in_flight=True, doc="relative motion that the plan is made on"
     )
     step: float = parameter(60.0, unit="s", above=0.0, in_flight=True, doc="step of the plan; whole ticks")
-    horizon: int = parameter(
-        30, minimum=1, maximum=500, in_flight=True, doc="steps that the plan looks ahead"
-    )
+    horizon: int = parameter(30, minimum=1, maximum=500, in_flight=True, doc="steps that the plan looks ahead")
     control_horizon: int = parameter(
         0, minimum=0, maximum=500, in_flight=True, doc="steps with thrust, none after them; 0 for all"
     )
@@ -132,7 +131,7 @@ class ModelPredictiveController(Controller):
 
     Parameters = MpcParameters
 
-    def __init__(self, parameters: MpcParameters, mission: Mission, vehicle: Vehicle) -> None:
+    def __init__(self, parameters: MpcParameters, common: CommonParameters, vehicle: Vehicle) -> None:
         """Tabulate the programme.
 
         Raises:
@@ -140,21 +139,21 @@ class ModelPredictiveController(Controller):
             or no LQR.
         """
         self._parameters = parameters
-        self._tick_ns, self._step_ns = mission.tick_ns, round(parameters.step * NANOSECONDS)
+        self._tick_ns, self._step_ns = common.tick_ns, round(parameters.step * NANOSECONDS)
         if self._step_ns % self._tick_ns:
             raise DesignError(
-                f"mpc: step is {parameters.step} s; it must be a whole number of ticks of {mission.tick} s"
+                f"mpc: step is {parameters.step} s; it must be a whole number of ticks of {common.tick} s"
             )
         self._steps = parameters.control_horizon or parameters.horizon
         if self._steps > parameters.horizon:
             allowed = f"it must be at most horizon, {parameters.horizon}"
             raise DesignError(f"mpc: control_horizon is {self._steps} steps; {allowed}")
-        self._model = DESIGN_MODELS[parameters.model](mission)
+        self._model = DESIGN_MODELS[parameters.model](common)
         self._limit, self._mass = vehicle.thrust_limit, vehicle.mass
         if parameters.total_thrust > 0.0:
             self._limit = np.minimum(self._limit, parameters.total_thrust)
         self._unit = float(self._limit.max())
-        eclipse = longest_eclipse(mission.chief)
+        eclipse = longest_eclipse(common.chief)
         if parameters.off_in_eclipse and eclipse >= self._steps * parameters.step:
             raise DesignError(
                 f"mpc: the horizon with thrust, {self._steps * parameters.step:.0f} s, is not longer "
@@ -163,7 +162,7 @@ class ModelPredictiveController(Controller):
         gain = "discrete" if self._model.is_time_invariant else "periodic"
         try:
             self.reserve = LinearQuadraticRegulator(
-                LqrParameters(model=parameters.model, gain=gain, **parameters.weights()), mission, vehicle
+                LqrParameters(model=parameters.model, gain=gain, **parameters.weights()), common, vehicle
             )
         except DesignError as error:
             raise DesignError(f"mpc, in reserve {error}") from error
@@ -176,7 +175,7 @@ class ModelPredictiveController(Controller):
         self._place = 0
         self._setup()
 
-    def _tabulate(self) -> list[Programme]:
+    def _tabulate(self) -> list[CondensedQp]:
         """The programme at each of the places along the orbit."""
         parameters, tick = self._parameters, self._tick_ns / NANOSECONDS
         stretches = 1 if self._model.is_time_invariant else STRETCHES
@@ -190,25 +189,20 @@ class ModelPredictiveController(Controller):
             share = parameters.step / tick
             running = share * state_weight
             weights = Weights.scaled(state_weight, self._mass**2 * thrust_weight, tick)
-            ticks = [
-                self._model.discretise(float(time), tick) for time in grid + 0.5 * grid[min(1, stretches - 1)]
-            ]
+            ticks = [self._model.discretise(float(time), tick) for time in grid + 0.5 * grid[min(1, stretches - 1)]]
             repeats = max(1, round(self._model.period / stretches / tick)) if stretches > 1 else 1
             ends = periodic_cost_to_go(ticks, repeats, weights)
             ends *= weights.cost_unit / np.outer(weights.state_unit, weights.state_unit)
         programmes = []
         for start in range(stretches):
-            places = (
-                start + parameters.step * np.arange(parameters.horizon + 1) * stretches / self._model.period
-            )
+            places = start + parameters.step * np.arange(parameters.horizon + 1) * stretches / self._model.period
             below = np.floor(places).astype(int)
             part = (places - below)[:, None, None]
             along = [
-                (1.0 - part) * each[below % stretches] + part * each[(below + 1) % stretches]
-                for each in (phi, gamma)
+                (1.0 - part) * each[below % stretches] + part * each[(below + 1) % stretches] for each in (phi, gamma)
             ]
             programmes.append(
-                Programme.condensed(
+                CondensedQp.condensed(
                     along[0][:-1],
                     along[1][:-1] * (self._unit / self._mass),
                     self._steps,
@@ -225,9 +219,7 @@ class ModelPredictiveController(Controller):
         parameters, steps = self._parameters, self._steps
         count = 3 * steps
         eye = sparse.eye_array(count)
-        extra = count * (parameters.cost == "absolute") + parameters.horizon * (
-            parameters.keep_out_radius > 0.0
-        )
+        extra = count * (parameters.cost == "absolute") + parameters.horizon * (parameters.keep_out_radius > 0.0)
         blocks = [[eye, sparse.csc_array((count, extra))]]
         if parameters.total_thrust > 0.0:
             facets = sparse.kron(sparse.eye_array(steps), sparse.csc_array(facet_normals()[3:]))
@@ -241,9 +233,7 @@ class ModelPredictiveController(Controller):
         if parameters.keep_out_radius > 0.0:
             rows = np.repeat(np.tri(parameters.horizon, steps), 3, axis=1)
             beyond = sparse.csc_array((parameters.horizon, extra - parameters.horizon))
-            blocks.append(
-                [sparse.csc_array(2.0 * rows), sparse.hstack([beyond, sparse.eye_array(parameters.horizon)])]
-            )
+            blocks.append([sparse.csc_array(2.0 * rows), sparse.hstack([beyond, sparse.eye_array(parameters.horizon)])])
         self._rows = sparse.csc_array(sparse.block_array(blocks))
         self._rows.sort_indices()
         self._keep_out_entries = np.flatnonzero(self._rows.data == 2.0)
@@ -290,10 +280,10 @@ class ModelPredictiveController(Controller):
         """The LQR that it becomes without active limits."""
         return self.reserve.linear(time)
 
-    def _hessian(self, programme: Programme) -> Vector:
+    def _hessian(self, programme: CondensedQp) -> Vector:
         return np.concatenate([programme.hessian, self._hessian_rest])
 
-    def take_over(self, handover: Handover) -> None:
+    def activate(self, handover: Handover) -> None:
         """Start from the force that flew before."""
         self._force = handover.force
 
@@ -332,9 +322,7 @@ class ModelPredictiveController(Controller):
         """(steps,) whether any part of each step (ns) from a time (ns) is in a foreseen eclipse."""
         begin = (time + step * np.arange(steps)[:, None]) / NANOSECONDS
         end = begin + step / NANOSECONDS
-        dark: NDArray[np.bool_] = np.any(
-            (begin < target.eclipse[:, 1]) & (end > target.eclipse[:, 0]), axis=1
-        )
+        dark: NDArray[np.bool_] = np.any((begin < target.eclipse[:, 1]) & (end > target.eclipse[:, 0]), axis=1)
         return dark
 
     def _follow(self, time: int, reason: str) -> Command | None:
@@ -376,7 +364,7 @@ class ModelPredictiveController(Controller):
         cost = 2.0 * result.info.obj_val / programme.scale + cost_of_free
         return Command(self._plan[0], result.info.status, int(result.info.iter), float(cost))
 
-    def _programme_at(self, time: int) -> Programme:
+    def _programme_at(self, time: int) -> CondensedQp:
         place = 0
         if len(self._programmes) > 1:
             places = time / NANOSECONDS / self._model.period * len(self._programmes)
@@ -387,7 +375,7 @@ class ModelPredictiveController(Controller):
         return self._programmes[place]
 
     def _error_of_free_motion(
-        self, programme: Programme, estimate: NavigationState, target: Target
+        self, programme: CondensedQp, estimate: NavigationState, target: Target
     ) -> tuple[Vector, float]:
         """Scaled gradient at no thrust, and its cost."""
         horizon = self._parameters.horizon
@@ -440,9 +428,7 @@ class ModelPredictiveController(Controller):
         self._constant_bounds = bounds if constant else None
         return bounds
 
-    def _keep_out(
-        self, programme: Programme, estimate: NavigationState, target: Target, lower: Vector
-    ) -> Vector:
+    def _keep_out(self, programme: CondensedQp, estimate: NavigationState, target: Target, lower: Vector) -> Vector:
         """Keep to the outside of a plane per step: that which touches the sphere of the satellite that is
         nearest then, where the last plan comes closest to it. The others fly freely.
 

@@ -5,14 +5,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from formation_gnc.common import CommonParameters
 from formation_gnc.control.controller import Vehicle
 from formation_gnc.control.finite_horizon import FiniteHorizonController, FiniteHorizonParameters, Plan, Task
 from formation_gnc.control.riccati import Weights, stationary_gain
 from formation_gnc.control.static_programming import STAGES, StaticPlan, mpsp, regulated
-from formation_gnc.interface import Vector
-from formation_gnc.mission import Mission
 from formation_gnc.parameters import parameter
 from formation_gnc.relative.hill import HillModel
+from formation_gnc.types import Vector
 
 TOLERANCE = 1e-3
 """Terminal error that counts as none, in units of `position_error` and `velocity_error`."""
@@ -31,10 +31,10 @@ class StaticProgrammingController(FiniteHorizonController):
     """What MPSP and G-MPSP share: LQR's history on Hill's equations as the first guess (Joshi 6.1.1), and the
     rest of the plan before as every later one."""
 
-    def __init__(self, parameters: StaticProgrammingParameters, mission: Mission, vehicle: Vehicle) -> None:
+    def __init__(self, parameters: StaticProgrammingParameters, common: CommonParameters, vehicle: Vehicle) -> None:
         """Design the law that holds; raises DesignError as every finite horizon."""
-        super().__init__(parameters, mission, vehicle)
-        self._hill = HillModel(mission.mean_motion)
+        super().__init__(parameters, common, vehicle)
+        self._hill = HillModel(common.mean_motion)
         self._cost = parameters.state_matrix(), vehicle.mass**2 * parameters.thrust_matrix()
         self._tolerance = TOLERANCE * np.array(parameters.position_error + parameters.velocity_error)
 

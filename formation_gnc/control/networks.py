@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from formation_gnc.interface import Matrix, Vector
+from formation_gnc.types import Matrix, Vector
 
 FORCED = np.eye(6)[3:]
 """(3, 6) acceleration to rate of change of the state."""

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, solve_continuous_are
 
 from formation_gnc.errors import DesignError
-from formation_gnc.interface import Matrix, Vector
+from formation_gnc.types import Matrix, Vector
 
 LARGEST_DOUBLING = 60
 """Doublings after which a solution that has not converged does not exist: 2^60 steps."""
@@ -44,9 +44,7 @@ class RiccatiMap:
     def then(self, later: "RiccatiMap") -> "RiccatiMap":
         """These steps and then the later ones."""
         size = len(self.cost)
-        both = np.linalg.solve(
-            np.eye(size) + self.reach @ later.cost, np.hstack([self.transition, self.reach])
-        )
+        both = np.linalg.solve(np.eye(size) + self.reach @ later.cost, np.hstack([self.transition, self.reach]))
         onward, spread = both[:, :size], both[:, size:]
         reach = later.reach + later.transition @ spread @ later.transition.T
         cost = self.cost + self.transition.T @ later.cost @ onward
@@ -132,8 +130,7 @@ class Weights:
                 )
         thrust = np.sqrt(np.diag(input_weight))
         position, velocity, integral = (
-            np.sqrt(np.diag(state_weight))[index : index + 3].max(initial=0.0) / thrust.min()
-            for index in (0, 3, 6)
+            np.sqrt(np.diag(state_weight))[index : index + 3].max(initial=0.0) / thrust.min() for index in (0, 3, 6)
         )
         rate = max(position**0.5, velocity, integral ** (1.0 / 3.0))
         if rate == 0.0:

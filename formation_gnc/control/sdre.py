@@ -5,20 +5,21 @@ from typing import Any
 
 import numpy as np
 
+from formation_gnc.common import CommonParameters
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
 from formation_gnc.control.feed_forward import FeedForward
 from formation_gnc.control.finite_horizon import PLAN_MODELS
+from formation_gnc.control.fixed_endpoint_lq import FACTORISATIONS, discretised, state_dependent
 from formation_gnc.control.integral import IntegralWeights, integrated, with_integral
 from formation_gnc.control.lqr import LinearQuadraticRegulator, LqrParameters
 from formation_gnc.control.riccati import Weights, stationary_gain
-from formation_gnc.control.steering import FACTORISATIONS, discretised, state_dependent
 from formation_gnc.errors import ConfigurationError, DesignError
-from formation_gnc.interface import NANOSECONDS, Matrix, NavigationState, Target, Vector
-from formation_gnc.mission import Mission
 from formation_gnc.orbit.elements import Elements, elements_from_state
 from formation_gnc.parameters import parameter
+from formation_gnc.records import NavigationState, Target
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.model import INPUT
+from formation_gnc.types import NANOSECONDS, Matrix, Vector
 
 
 @dataclass(frozen=True)
@@ -68,26 +69,26 @@ class Sdre(Controller):
 
     Parameters = SdreParameters
 
-    def __init__(self, parameters: SdreParameters, mission: Mission, vehicle: Vehicle) -> None:
+    def __init__(self, parameters: SdreParameters, common: CommonParameters, vehicle: Vehicle) -> None:
         """Scale the weights and design the law in reserve.
 
         Raises:
             DesignError: inadmissible weights.
         """
         self._parameters = parameters
-        self._tick, self._limit, self._mass = mission.tick, vehicle.thrust_limit.tolist(), vehicle.mass
-        self._chief = mission.chief
+        self._tick, self._limit, self._mass = common.tick, vehicle.thrust_limit.tolist(), vehicle.mass
+        self._chief = common.chief
         self._integrates = parameters.integrates
         self._integral = [0.0, 0.0, 0.0] if self._integrates else []
         self._gain: Matrix | DesignError = DesignError("none yet")
         self._updated_at: int | None = None
         try:
             r = vehicle.mass**2 * parameters.thrust_matrix()
-            self._weights = Weights.scaled(parameters.joint_matrix(), r, mission.tick)
+            self._weights = Weights.scaled(parameters.joint_matrix(), r, common.tick)
         except DesignError as error:
             raise DesignError(f"sdre: {error}") from error
-        self.reserve = LinearQuadraticRegulator(LqrParameters(**parameters.weights()), mission, vehicle)
-        self._feed_forward = FeedForward(parameters.feed_forward, HillModel(mission.mean_motion))
+        self.reserve = LinearQuadraticRegulator(LqrParameters(**parameters.weights()), common, vehicle)
+        self._feed_forward = FeedForward(parameters.feed_forward, HillModel(common.mean_motion))
 
     def figures(self) -> dict[str, Any]:
         """The gain on force for a deputy at the chief, where the chief is at the start."""
@@ -96,7 +97,7 @@ class Sdre(Controller):
         gain = self.gain(system(np.zeros((1, 6)))[0][0])
         return {"gain at the chief, at the start [N/m, N/(m/s), N/(m s)]": (self._mass * gain).tolist()}
 
-    def take_over(self, handover: Handover) -> None:
+    def activate(self, handover: Handover) -> None:
         """Keep the integral of an SDRE that flew before."""
         if self._integrates and isinstance(handover.law, Sdre):
             self._integral = handover.law._integral or self._integral
@@ -146,7 +147,5 @@ class Sdre(Controller):
         wanted, reason_of_none = self._feed_forward(estimate, target)
         force = estimate.mass * (acceleration + ((there - here) @ goal)[3:] + wanted)
         if self._integrates:
-            self._integral = integrated(
-                self._integral, error[:3].tolist(), force.tolist(), self._limit, self._tick
-            )
+            self._integral = integrated(self._integral, error[:3].tolist(), force.tolist(), self._limit, self._tick)
         return Command(force, fallback=reason_of_none)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from formation_gnc.control.finite_horizon import FiniteHorizonController, FiniteHorizonParameters, Plan, Task
-from formation_gnc.control.steering import FACTORISATIONS, Cost, discretised, state_dependent, steer
+from formation_gnc.control.fixed_endpoint_lq import FACTORISATIONS, Cost, discretised, state_dependent, steer
 from formation_gnc.parameters import parameter
 
 
@@ -35,9 +35,7 @@ class FiniteSdre(FiniteHorizonController):
 
     def plan(self, task: Task) -> Plan:
         """The linear problem of now."""
-        a, b = state_dependent(task.model, self._parameters.factorisation, np.array([task.time]))(
-            task.state[None]
-        )
+        a, b = state_dependent(task.model, self._parameters.factorisation, np.array([task.time]))(task.state[None])
         phi, gamma = discretised(np.repeat(a, 3, axis=0), np.repeat(b, 3, axis=0), task.step)
         found = steer(
             np.broadcast_to(phi, (task.steps, 6, 6)),

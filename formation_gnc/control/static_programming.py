@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from formation_gnc.control.finite_horizon import Plan, Task
-from formation_gnc.interface import Matrix, Vector
 from formation_gnc.relative.model import INPUT, RelativeModel
+from formation_gnc.types import Matrix, Vector
 
 SINGULAR = 1e-9
 """Least eigenvalue of A_lambda, each of its states in units of its own reach, above which it can be solved
@@ -73,9 +73,7 @@ def mpsp(task: Task, tolerance: Vector, most_iterations: int = 20, method: str =
 
         return path[-1], sensitivities
 
-    history, errors, failure = _solve(
-        task, guess, predict, np.full(task.steps, task.step), tolerance, most_iterations
-    )
+    history, errors, failure = _solve(task, guess, predict, np.full(task.steps, task.step), tolerance, most_iterations)
     return StaticPlan(history, task.duration, len(errors) - 1, failure, history=history, errors=errors)
 
 

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from formation_gnc.errors import DesignError
-from formation_gnc.interface import Matrix, Vector
 from formation_gnc.parameters import parameter
+from formation_gnc.types import Matrix, Vector
 
 
 @dataclass(frozen=True)

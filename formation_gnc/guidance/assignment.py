@@ -12,7 +12,7 @@ from scipy.optimize import linear_sum_assignment, minimize_scalar
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.guidance.transfer import delta_v
-from formation_gnc.interface import Matrix, Vector
+from formation_gnc.types import Matrix, Vector
 
 PHASES = 72
 """Phases at which an assignment is tried before the best one is refined."""

@@ -8,7 +8,7 @@ import numpy as np
 from formation_gnc.guidance.assignment import Assignment, assign_with_phase, fuel_weights, transfer_costs
 from formation_gnc.guidance.registry import FORMATIONS
 from formation_gnc.guidance.targets import TARGET_MODELS, TargetPath
-from formation_gnc.interface import Matrix, Vector
+from formation_gnc.types import Matrix, Vector
 
 LEAST_TANK = 1e-3
 """Propellant (kg) that the emptiest tank counts as."""
@@ -27,7 +27,7 @@ def path_to(parameters: Any, slot: int, phase: float) -> TargetPath:
     return TARGET_MODELS[parameters.model](kind(own, parameters.mean_motion, slot), phase, parameters)
 
 
-def share_out(parameters: Any, time: float, states: Matrix, masses: Vector) -> Assignment:
+def assign_slots(parameters: Any, time: float, states: Matrix, masses: Vector) -> Assignment:
     """Places of a fleet in its formation, and the formation's phase, for the least total delta-v from now.
 
     Args:

@@ -5,8 +5,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from formation_gnc.interface import Matrix, Vector
 from formation_gnc.relative.hill import HillModel
+from formation_gnc.types import Matrix, Vector
 
 
 class Formation(ABC):

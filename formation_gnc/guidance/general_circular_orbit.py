@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from formation_gnc.guidance.ring import Ring
-from formation_gnc.interface import Vector
+from formation_gnc.types import Vector
 
 
 class GeneralCircularOrbit(Ring):

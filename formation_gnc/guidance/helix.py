@@ -4,7 +4,7 @@ import numpy as np
 
 from formation_gnc.guidance.formation import hill_from_lvlh
 from formation_gnc.guidance.ring import Ring
-from formation_gnc.interface import Vector
+from formation_gnc.types import Vector
 
 
 class Helix(Ring):

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from formation_gnc.guidance.formation import Formation
-from formation_gnc.interface import Matrix, Vector
 from formation_gnc.parameters import parameter
+from formation_gnc.types import Matrix, Vector
 
 
 @dataclass(frozen=True)

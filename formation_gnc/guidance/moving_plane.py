@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from formation_gnc.guidance.formation import FreeMotion, hill_from_lvlh
-from formation_gnc.interface import Vector
 from formation_gnc.parameters import parameter
+from formation_gnc.types import Vector
 
 
 @dataclass(frozen=True)
@@ -28,9 +28,7 @@ class MovingPlaneParameters:
         in_flight=True,
         doc="distance across the track when place 0 is furthest ahead",
     )
-    slope: float = parameter(
-        1.234567, in_flight=True, doc="rate across the track there, over that of place 0 outwards"
-    )
+    slope: float = parameter(1.234567, in_flight=True, doc="rate across the track there, over that of place 0 outwards")
 
 
 class MovingPlane(FreeMotion):

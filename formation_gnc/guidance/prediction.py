@@ -6,7 +6,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from formation_gnc.guidance.targets import TargetPath
-from formation_gnc.interface import NANOSECONDS, Matrix, Separation, Target, Vector
+from formation_gnc.records import Separation, Target
+from formation_gnc.types import NANOSECONDS, Matrix, Vector
 
 POINTS = 60
 """Points of a revolution at which distances are looked at; between two, satellites move straight on, which
@@ -18,7 +19,7 @@ def predict(
     target: Target,
     state: Vector,
     names: list[str],
-    mates: Mapping[str, TargetPath],
+    neighbours: Mapping[str, TargetPath],
     horizon: float,
     mean_motion: float,
 ) -> Separation:
@@ -32,7 +33,7 @@ def predict(
         target: where the satellite is to be, with the preview, and where the others are.
         state: (6,) where it is, Hill frame, m and m/s.
         names: of the others, one or more.
-        mates: paths of others, by name, as far as they are known.
+        neighbours: paths of others, by name, as far as they are known.
         horizon: revolutions for which all coast.
         mean_motion: rate of the chief, rad/s.
     """
@@ -40,15 +41,13 @@ def predict(
     ahead = target.preview_step * np.arange(len(target.preview) + 1.0)
     others = path.coast(target.others, time, ahead)
     for index, name in enumerate(names):
-        if name in mates:
-            others[:, index] = mates[name].states(time + ahead)
+        if name in neighbours:
+            others[:, index] = neighbours[name].states(time + ahead)
     planned = np.vstack([target.relative_state, target.preview])[:, None] - others
     later: Vector = np.linspace(0.0, horizon * math.tau / mean_motion, math.ceil(horizon * POINTS) + 1)
     passive = path.coast(state - target.others, time, later)
     near, far = _nearest(planned, ahead), _nearest(passive, later)
-    return Separation(
-        target.time, near[0], time + near[1], names[near[2]], far[0], time + far[1], names[far[2]]
-    )
+    return Separation(target.time, near[0], time + near[1], names[near[2]], far[0], time + far[1], names[far[2]])
 
 
 def in_words(separation: Separation) -> str:

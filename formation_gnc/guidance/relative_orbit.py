@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from formation_gnc.guidance.formation import Formation
-from formation_gnc.interface import Matrix, Vector
 from formation_gnc.parameters import parameter
+from formation_gnc.types import Matrix, Vector
 
 
 @dataclass(frozen=True)
@@ -17,16 +17,10 @@ class RelativeOrbitParameters:
         1000.0, unit="m", minimum=0.0, in_flight=True, doc="radial amplitude; twice that along-track"
     )
     theta: float = parameter(0.0, unit="rad", in_flight=True, doc="phase at the start of the run")
-    a: float = parameter(
-        0.0, unit="m", in_flight=True, doc="radial offset; makes the orbit drift along-track"
-    )
+    a: float = parameter(0.0, unit="m", in_flight=True, doc="radial offset; makes the orbit drift along-track")
     b: float = parameter(0.0, unit="m", in_flight=True, doc="along-track offset")
-    m: float = parameter(
-        0.0, in_flight=True, doc="slope of the cross-track motion in phase with the radial one"
-    )
-    n: float = parameter(
-        0.0, in_flight=True, doc="slope of the cross-track motion in phase with the along-track one"
-    )
+    m: float = parameter(0.0, in_flight=True, doc="slope of the cross-track motion in phase with the radial one")
+    n: float = parameter(0.0, in_flight=True, doc="slope of the cross-track motion in phase with the along-track one")
 
 
 class RelativeOrbit(Formation):

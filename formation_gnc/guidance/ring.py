@@ -5,9 +5,9 @@ from abc import abstractmethod
 from dataclasses import dataclass
 
 from formation_gnc.guidance.formation import FreeMotion
-from formation_gnc.interface import Vector
 from formation_gnc.parameters import parameter
 from formation_gnc.relative.hill import HillModel
+from formation_gnc.types import Vector
 
 
 @dataclass(frozen=True)
@@ -40,9 +40,7 @@ class Ring(FreeMotion):
     def start(cls, parameters: RingParameters, mean_motion: float, slot: int) -> Vector:  # type: ignore[override]
         """The first place's state, carried round."""
         later = math.tau * slot / (parameters.satellites * mean_motion)
-        state: Vector = HillModel(mean_motion).transition(0.0, later) @ cls.first(
-            parameters.size, mean_motion
-        )
+        state: Vector = HillModel(mean_motion).transition(0.0, later) @ cls.first(parameters.size, mean_motion)
         return state
 
     @staticmethod

@@ -6,8 +6,8 @@ import numpy as np
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.guidance.formation import FreeMotion
-from formation_gnc.interface import Vector
 from formation_gnc.parameters import parameter
+from formation_gnc.types import Vector
 
 
 @dataclass(frozen=True)

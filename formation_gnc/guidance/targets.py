@@ -7,10 +7,9 @@ from functools import cache
 
 import numpy as np
 
+from formation_gnc.common import CommonParameters
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.guidance.formation import Formation
-from formation_gnc.interface import Matrix, Vector
-from formation_gnc.mission import Mission
 from formation_gnc.orbit.elements import (
     Elements,
     elements_from_state,
@@ -24,6 +23,7 @@ from formation_gnc.relative.chief import KeplerChief
 from formation_gnc.relative.hill import HarmonicModel, HillModel
 from formation_gnc.relative.model import LinearModel
 from formation_gnc.relative.tschauner_hempel import TschaunerHempelModel
+from formation_gnc.types import Matrix, Vector
 
 CHECKS = 24
 """Points of a revolution at which the error of a model is looked at."""
@@ -36,10 +36,10 @@ class TargetPath(ABC):
     size or place meets the others there.
     """
 
-    def __init__(self, formation: Formation, phase: float, mission: Mission) -> None:
-        """Carry `formation`, made for the mission's mean motion, forward from `phase` (rad) at time zero."""
-        self._formation, self._phase, self._mission = formation, phase, mission
-        self._ahead = phase / mission.mean_motion
+    def __init__(self, formation: Formation, phase: float, common: CommonParameters) -> None:
+        """Carry `formation`, made for the common's mean motion, forward from `phase` (rad) at time zero."""
+        self._formation, self._phase, self._common = formation, phase, common
+        self._ahead = phase / common.mean_motion
 
     @abstractmethod
     def states(self, times: Vector) -> Matrix:
@@ -64,9 +64,9 @@ class TargetPath(ABC):
         Raises:
             ConfigurationError: the path starts on no orbit about the Earth.
         """
-        chief = Elements(**vars(self._mission.chief))
+        chief = Elements(**vars(self._common.chief))
         inertial = state_from_elements(chief)
-        times = np.linspace(0.0, math.tau / self._mission.mean_motion, CHECKS + 1)
+        times = np.linspace(0.0, math.tau / self._common.mean_motion, CHECKS + 1)
         path = self.states(times)
         try:
             deputy = elements_from_state(inertial_from_relative(inertial, path[0]))
@@ -103,7 +103,7 @@ class HillPath(TargetPath):
         return self._formation.states(np.asarray(times) + self._ahead)
 
     def _transitions(self, time: float, ahead: Vector) -> Matrix:
-        transitions: Matrix = HillModel(self._mission.mean_motion).transition(0.0, ahead)
+        transitions: Matrix = HillModel(self._common.mean_motion).transition(0.0, ahead)
         return transitions
 
 
@@ -116,7 +116,7 @@ class _StartedPath(TargetPath):
     """
 
     def _start(self, model: LinearModel, in_plane: float, across: float) -> Vector:
-        n = self._mission.mean_motion
+        n = self._common.mean_motion
         given = self._formation.states(np.array([self._ahead]))[0]
         start = given * np.array([1.0, 1.0, 1.0, in_plane / n, 1.0, across / n])
         bounded: Vector = model.bounded(0.0, start)
@@ -131,10 +131,10 @@ class YamanakaAnkersenPath(_StartedPath):
     along the track and across it the path is drawn out with the chief's distance.
     """
 
-    def __init__(self, formation: Formation, phase: float, mission: Mission) -> None:
+    def __init__(self, formation: Formation, phase: float, common: CommonParameters) -> None:
         """Start at the chief's anomaly at time zero."""
-        super().__init__(formation, phase, mission)
-        chief = KeplerChief.of(Elements(**vars(mission.chief)))
+        super().__init__(formation, phase, common)
+        chief = KeplerChief.of(Elements(**vars(common.chief)))
         rate = chief.at(0.0).angular_rate
         self._model = TschaunerHempelModel(chief)
         self._state = self._start(self._model, rate, rate)
@@ -175,10 +175,10 @@ class J2MeanMotionModel(HarmonicModel):
 class J2MeanMotionPath(_StartedPath):
     """Free motion at the mean rates under J2: the phase keeps up with the truth, the shape shears with it."""
 
-    def __init__(self, formation: Formation, phase: float, mission: Mission) -> None:
+    def __init__(self, formation: Formation, phase: float, common: CommonParameters) -> None:
         """Start at the phase at time zero."""
-        super().__init__(formation, phase, mission)
-        self._model = J2MeanMotionModel.of(Elements(**vars(mission.chief)))
+        super().__init__(formation, phase, common)
+        self._model = J2MeanMotionModel.of(Elements(**vars(common.chief)))
         _, in_plane, across = self._model.frequencies
         self._state = self._start(self._model, in_plane, across)
 
@@ -192,7 +192,7 @@ class J2MeanMotionPath(_StartedPath):
 
     def error(self) -> tuple[float, float]:
         """As Hill's: about a point mass, the rates that J2 gives would count as an error."""
-        return HillPath(self._formation, self._phase, self._mission).error()
+        return HillPath(self._formation, self._phase, self._common).error()
 
 
 TARGET_MODELS: dict[str, type[TargetPath]] = {

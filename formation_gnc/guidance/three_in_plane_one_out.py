@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from formation_gnc.guidance.formation import FreeMotion, hill_from_lvlh
-from formation_gnc.interface import Vector
 from formation_gnc.parameters import parameter
 from formation_gnc.relative.hill import HillModel
+from formation_gnc.types import Vector
 
 
 @dataclass(frozen=True)

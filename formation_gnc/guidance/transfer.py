@@ -10,8 +10,8 @@ from functools import lru_cache
 import numpy as np
 from scipy.optimize import linprog
 
-from formation_gnc.interface import Matrix, Vector
 from formation_gnc.relative.hill import HillModel
+from formation_gnc.types import Matrix, Vector
 
 SEGMENTS = 24
 """Stretches of constant acceleration in a revolution, and at least in a transfer."""

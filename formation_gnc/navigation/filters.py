@@ -13,10 +13,10 @@ from filterpy.kalman import (
     unscented_transform,
 )
 
-from formation_gnc.interface import Matrix, Vector
 from formation_gnc.navigation import kernels
 from formation_gnc.navigation.measurement import Readings, pseudo_jacobian, pseudo_measurements
-from formation_gnc.navigation.process import Leg, ProcessModel
+from formation_gnc.navigation.process import Interval, ProcessModel
+from formation_gnc.types import Matrix, Vector
 
 
 @lru_cache(maxsize=16)
@@ -33,7 +33,7 @@ class RelativeFilter(Protocol):
     P: Matrix
     """(6, 6) its covariance."""
 
-    def fly(self, process: ProcessModel, leg: Leg, noise: Matrix) -> Matrix:
+    def fly(self, process: ProcessModel, leg: Interval, noise: Matrix) -> Matrix:
         """Predict to the end of the leg; returns the transition matrix (6, 6)."""
 
     def weigh(self, readings: Readings) -> tuple[Vector, Vector, Matrix]:
@@ -54,7 +54,7 @@ class ExtendedFilter(ExtendedKalmanFilter):  # type: ignore[misc]
         super().__init__(dim_x=6, dim_z=3)
         self.x, self.P = state, covariance
 
-    def fly(self, process: ProcessModel, leg: Leg, noise: Matrix) -> Matrix:
+    def fly(self, process: ProcessModel, leg: Interval, noise: Matrix) -> Matrix:
         """Take state and covariance from the process model, which has computed F P F' + Q on the way."""
         self.x, self.P, self.F = process.predict(leg, self.x, self.P, noise)
         return self.F
@@ -102,7 +102,7 @@ class UnscentedFilter(UnscentedKalmanFilter):  # type: ignore[misc]
         super().__init__(6, 3, 1.0, hx=None, fx=None, points=JulierSigmaPoints(6, kappa=0.0))
         self.x, self.P = state, covariance
 
-    def fly(self, process: ProcessModel, leg: Leg, noise: Matrix) -> Matrix:
+    def fly(self, process: ProcessModel, leg: Interval, noise: Matrix) -> Matrix:
         """Move the points; the transition matrix is that of the mean."""
         *_, transition = process.predict(leg, self.x, self.P, noise)
         self.sigmas_f = process.move(leg, self.points_fn.sigma_points(self.x, self.P))
@@ -129,9 +129,7 @@ class UnscentedFilter(UnscentedKalmanFilter):  # type: ignore[misc]
             sensor, reading = readings.sensor, readings.value
             radius = sqrt(readings.chief[:3] @ readings.chief[:3])
             slope = pseudo_jacobian(sensor, reading)
-            read = pseudo_measurements(sensor, reading + read, radius) - pseudo_measurements(
-                sensor, reading, radius
-            )
+            read = pseudo_measurements(sensor, reading + read, radius) - pseudo_measurements(sensor, reading, radius)
             noise = slope @ noise @ slope.T
         scale = np.sqrt(np.diag(noise))
         read, noise = read / scale, noise / (scale[:, None] * scale)

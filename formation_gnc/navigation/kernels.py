@@ -12,12 +12,12 @@ from numba import float64, int64
 from numba.types import Array as NumbaArray
 from numpy.typing import NDArray
 
-from formation_gnc.interface import Sensor
 from formation_gnc.orbit.frames import hill_frame, to_inertial, to_relative
 from formation_gnc.orbit.gravity import oblate_acceleration
 from formation_gnc.orbit.jit import ANY_MATRIX, ANY_VECTOR, inline, kernel
 from formation_gnc.orbit.propagation import advance_with_transition
 from formation_gnc.orbit.runge_kutta import COUPLING, STAGES, WEIGHTS
+from formation_gnc.records import Sensor
 
 Array = NDArray[np.float64]
 
@@ -117,9 +117,7 @@ def coast(state: Array, acceleration: Array, duration: float, substeps: int) -> 
 
 
 @kernel((ANY_VECTOR, ANY_VECTOR, float64, int64, float64, float64))
-def can_be_there(
-    chief: Array, told: Array, tick: float, substeps: int, distance: float, speed: float
-) -> bool:
+def can_be_there(chief: Array, told: Array, tick: float, substeps: int, distance: float, speed: float) -> bool:
     """Whether a tick later the chief can be where it is told to be.
 
     Args:
@@ -193,9 +191,7 @@ def fly_points(
     flown = _coast(chief, 0.0, 0.0, 0.0, tick, substeps)
     out = np.empty((points.shape[0], 6))
     for index in range(points.shape[0]):
-        deputy = _coast(
-            to_inertial(axes, rate, chief, points[index]), thrust[0], thrust[1], thrust[2], tick, substeps
-        )
+        deputy = _coast(to_inertial(axes, rate, chief, points[index]), thrust[0], thrust[1], thrust[2], tick, substeps)
         out[index] = to_relative(next_axes, next_rate, flown, deputy)
     return out
 
@@ -252,7 +248,7 @@ def read(sensors: NDArray[np.int64], deputy: Array, chief: Array) -> tuple[Array
     simplifications of his 3.13), right ascension, and distance to the chief.
 
     Args:
-        sensors: the k sensors that read, constants of `formation_gnc.interface.Sensor`.
+        sensors: the k sensors that read, constants of `formation_gnc.records.Sensor`.
         deputy: inertial state, (6,), m and m/s.
         chief: the same of the chief, which only its range depends on.
 
@@ -288,9 +284,7 @@ def carry(direction: Array, transition: Array, mean_motion: float) -> None:
     moved = np.zeros(6)
     for i in range(6):
         for k in range(3):
-            moved[i] += (
-                transition[i, k] * direction[k] + transition[i, 3 + k] * direction[3 + k] * mean_motion
-            )
+            moved[i] += transition[i, k] * direction[k] + transition[i, 3 + k] * direction[3 + k] * mean_motion
     square = 0.0
     for i in range(3):
         moved[3 + i] /= mean_motion

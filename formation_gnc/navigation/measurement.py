@@ -6,11 +6,12 @@ from math import pi
 
 import numpy as np
 
-from formation_gnc.interface import Matrix, Sensor, Vector
 from formation_gnc.navigation import kernels
-from formation_gnc.navigation.process import Leg, substeps
+from formation_gnc.navigation.process import Interval, substeps
 from formation_gnc.orbit.frames import hill_rotation, hill_transform_inverse, inertial_from_relative
 from formation_gnc.orbit.propagation import advance_with_transition
+from formation_gnc.records import Sensor
+from formation_gnc.types import Matrix, Vector
 
 NAMES = {sensor: sensor.name.lower() for sensor in Sensor}
 """Sensors as parameters and events call them."""
@@ -20,14 +21,14 @@ _RIGHT_ASCENSION = int(Sensor.RIGHT_ASCENSION)
 _AT_REST = np.zeros(3)
 
 
-class Track:
+class StateHistory:
     """The legs last flown, so that the deputy can be followed back to when a late reading was taken."""
 
-    def __init__(self, longest: int, earlier: "Track | None" = None) -> None:
+    def __init__(self, longest: int, earlier: "StateHistory | None" = None) -> None:
         """Remember at most so many legs, starting with those of an earlier track."""
-        self._legs: deque[Leg] = deque(earlier._legs if earlier else (), maxlen=longest)
+        self._legs: deque[Interval] = deque(earlier._legs if earlier else (), maxlen=longest)
 
-    def add(self, leg: Leg) -> None:
+    def add(self, leg: Interval) -> None:
         """The leg that ends now."""
         self._legs.append(leg)
 
@@ -71,7 +72,7 @@ class Readings:
     """(k,) of the noise."""
     chief: Vector
     """(6,) the chief's inertial state now."""
-    track: Track
+    track: StateHistory
     late: bool
     """Whether any of them is older than now."""
 

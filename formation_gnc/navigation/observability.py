@@ -8,13 +8,13 @@ from math import tau
 
 import numpy as np
 
-from formation_gnc.interface import Matrix, Vector
 from formation_gnc.navigation import kernels
-from formation_gnc.navigation.process import Leg, NonlinearProcess, substeps
+from formation_gnc.navigation.process import Interval, NonlinearProcess, substeps
 from formation_gnc.orbit.frames import hill_transform
+from formation_gnc.types import Matrix, Vector
 
-BLIND = 1e-9
-"""A direction about which the sensors tell less than this, relative to the best-seen one, is blind: both in
+UNOBSERVABLE = 1e-9
+"""A direction about which the sensors tell less than this, relative to the best-seen one, is unobservable: both in
 information, the square of an inverse length. Rounding and an imperfect linearisation leave 1e-13 of a
 direction that has none."""
 
@@ -29,9 +29,7 @@ _ON_THE_CHIEF = np.zeros(6)
 _NO_NOISE = np.zeros((6, 6))
 
 
-def gramian(
-    chief: Vector, variance: dict[int, float], window: float, state: Vector = _ON_THE_CHIEF
-) -> Matrix:
+def gramian(chief: Vector, variance: dict[int, float], window: float, state: Vector = _ON_THE_CHIEF) -> Matrix:
     """Observability Gramian of a deputy over a time to come: sum of (H Phi)' R^-1 (H Phi).
 
     Args:
@@ -52,7 +50,7 @@ def gramian(
         seen = np.isfinite(jacobian).all(axis=1)
         total += information(jacobian[seen] @ since, weight[seen])
         later = kernels.coast(chief, _AT_REST, step, substeps(step))
-        leg = Leg(chief, later, _AT_REST, step, substeps(step))
+        leg = Interval(chief, later, _AT_REST, step, substeps(step))
         state, _, transition = NonlinearProcess().predict(leg, state, _NO_NOISE, _NO_NOISE)
         chief, since = later, transition @ since
     return total
@@ -64,16 +62,16 @@ def information(jacobian: Matrix, weight: Vector) -> Matrix:
     return told
 
 
-def blind_directions(gramian: Matrix, mean_motion: float) -> Matrix:
+def unobservable_directions(gramian: Matrix, mean_motion: float) -> Matrix:
     """The directions, (b, 6), about which a Gramian has no information, the blindest first."""
     scale = np.repeat([1.0, mean_motion], 3)
     information, directions = np.linalg.eigh(gramian * np.outer(scale, scale))
-    blind = directions.T[information <= BLIND * information[-1]]
+    unobservable = directions.T[information <= UNOBSERVABLE * information[-1]]
     # An eigenvector is one up to its sign: let its largest component be positive.
-    return np.array([each * np.sign(each[np.argmax(np.abs(each))]) for each in blind]).reshape(-1, 6)
+    return np.array([each * np.sign(each[np.argmax(np.abs(each))]) for each in unobservable]).reshape(-1, 6)
 
 
-def predicted_blind_direction(chief: Vector) -> Vector:
+def predicted_unobservable_direction(chief: Vector) -> Vector:
     """The direction (6,) that radius, range rate and latitude cannot see: a turn of the orbit about the
     Earth's axis.
 
@@ -95,12 +93,12 @@ def orbit_period(chief: Vector) -> float:
 
 
 def in_words(directions: Matrix) -> str:
-    """The blind directions (b, 6) by their largest components; empty when there are none."""
+    """The unobservable directions (b, 6) by their largest components; empty when there are none."""
     return ", ".join(AXES[int(np.argmax(np.abs(each)))] for each in directions)
 
 
 class Observability:
-    """The Gramian of what the filter really took, over one window after the other, and the blind direction
+    """The Gramian of what the filter really took, over one window after the other, and the unobservable direction
     it shows.
 
     At the start of a window the state is x_0; a reading taken later says H Phi(t, t_0) x_0. A tick costs
@@ -113,7 +111,7 @@ class Observability:
     ) -> None:
         """Foresee what sensors with these variances will tell; see `gramian`."""
         self._mean_motion, self._window = mean_motion, window
-        self._set(blind_directions(gramian(chief, variance, window, state), mean_motion))
+        self._set(unobservable_directions(gramian(chief, variance, window, state), mean_motion))
         self._restart()
 
     def _restart(self) -> None:
@@ -125,15 +123,15 @@ class Observability:
         """(6,) the blindest direction now; zero when everything is seen."""
 
     def fly(self, transition: Matrix, duration: float) -> bool:
-        """Move along; returns whether a window has ended, and with it what is said of the blind direction."""
+        """Move along; returns whether a window has ended, and with it what is said of the unobservable direction."""
         self.direction = self._moved(self.direction, transition)
         kernels.compose(self._since, transition)
         self._elapsed += duration
         if self._elapsed < self._window:
             return False
         if self._told.any():
-            blind = blind_directions(self._told, self._mean_motion)
-            self._set(np.array([self._moved(each, self._since) for each in blind]).reshape(-1, 6))
+            unobservable = unobservable_directions(self._told, self._mean_motion)
+            self._set(np.array([self._moved(each, self._since) for each in unobservable]).reshape(-1, 6))
         self._restart()
         return True
 

@@ -10,12 +10,13 @@ import numpy as np
 
 from formation_gnc.analysis.metrics import deputies_of
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.interface import NANOSECONDS, Estimate, Matrix, Measurement, Refusal, Vector
-from formation_gnc.navigation.navigator import NavigationParameters, Navigator
+from formation_gnc.flight.module import changes_told
+from formation_gnc.navigation.navigation_filter import NavigationFilter, NavigationParameters
 from formation_gnc.parameters import leaves, load, read_yaml
-from formation_gnc.part import changes_told
 from formation_gnc.recording.provenance import parameters_record
 from formation_gnc.recording.reader import Bag
+from formation_gnc.records import Estimate, Measurement, Rejection
+from formation_gnc.types import NANOSECONDS, Matrix, Vector
 
 
 @dataclass(frozen=True)
@@ -32,8 +33,8 @@ class Estimates:
     used: Vector
     """(N,) readings used at each stamp."""
     status: np.ndarray
-    refusals: np.ndarray
-    """(12,) at the end, by `Refusal`."""
+    rejections: np.ndarray
+    """(12,) at the end, by `Rejection`."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class FilterFigures:
     mean_nees: float
     mean_nis: float
     readings: int
-    refusals: dict[str, int]
+    rejections: dict[str, int]
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def compare(bag: Bag, deputy: str, overrides: Mapping[str, Any]) -> Comparison:
     index = deputies_of(bag).index(deputy)
     states = truth[f"deputies.{index}.relative_state"]
     before = recorded_estimates(bag, deputy)
-    after = stacked(list(fly_again(bag, deputy, Navigator(node, parameters), frozenset(overrides))))
+    after = stacked(list(fly_again(bag, deputy, NavigationFilter(node, parameters), frozenset(overrides))))
     both = np.intersect1d(np.intersect1d(before.time, after.time), truth["stamp_ns"])
     if not len(both):
         raise ConfigurationError(f"{bag.path}: no tick on which the filters of {deputy} both answered")
@@ -102,7 +103,7 @@ def recorded_parameters(bag: Bag, node: str, overrides: Mapping[str, Any]) -> Na
     return load(NavigationParameters, own | dict(overrides))
 
 
-def fly_again(bag: Bag, deputy: str, navigator: Navigator, fixed: frozenset[str]) -> Iterator[Estimate]:
+def fly_again(bag: Bag, deputy: str, navigator: NavigationFilter, fixed: frozenset[str]) -> Iterator[Estimate]:
     """Estimates of a filter given the recorded measurements, and the changes of parameters that were made
     in flight.
 
@@ -116,7 +117,7 @@ def fly_again(bag: Bag, deputy: str, navigator: Navigator, fixed: frozenset[str]
     for _, message, _ in bag.decoded([f"/{deputy}/measurement"]):
         measurement = _measurement(message)
         for each in changes.pop(measurement.time, []):
-            navigator.adopt(navigator.prepare(each))
+            navigator.commit(navigator.stage(each))
         estimate = navigator.on_tick(measurement)
         if estimate is not None:
             yield estimate
@@ -130,11 +131,7 @@ def _changes_in_flight(bag: Bag, node: str, fixed: frozenset[str]) -> dict[int, 
         return changes
     for _, event, _ in bag.decoded(["/events"]):
         if event.node == node and event.kind == "parameters":
-            found = {
-                name: read_yaml(text)
-                for name, text in changes_told(event.detail).items()
-                if name not in fixed
-            }
+            found = {name: read_yaml(text) for name, text in changes_told(event.detail).items() if name not in fixed}
             if found:
                 changes.setdefault(_stamp(event), []).append(found)
     return changes
@@ -163,7 +160,7 @@ def _measurement(message: Any) -> Measurement:
 def recorded_estimates(bag: Bag, deputy: str) -> Estimates:
     """The estimates in a bag."""
     recorded = bag.arrays(f"/{deputy}/estimate")
-    refusals = recorded.get("refusals", np.zeros((1, len(Refusal)), dtype=np.uint32))
+    rejections = recorded.get("rejections", np.zeros((1, len(Rejection)), dtype=np.uint32))
     return Estimates(
         recorded["stamp_ns"],
         recorded["relative_state"],
@@ -171,7 +168,7 @@ def recorded_estimates(bag: Bag, deputy: str) -> Estimates:
         recorded["nis"],
         np.array([len(each) for each in recorded["sensor"]]),
         recorded["status"].astype(int),
-        refusals[-1].astype(int),
+        rejections[-1].astype(int),
     )
 
 
@@ -184,7 +181,7 @@ def stacked(estimates: list[Estimate]) -> Estimates:
         np.array([each.nis for each in estimates]),
         np.array([len(each.sensor) for each in estimates]),
         np.array([each.status for each in estimates]),
-        (estimates[-1].refusals if estimates else np.zeros(len(Refusal))).astype(int),
+        (estimates[-1].rejections if estimates else np.zeros(len(Rejection))).astype(int),
     )
 
 
@@ -205,8 +202,8 @@ def _figures(estimates: Estimates, times: np.ndarray, truth: Matrix) -> FilterFi
         mean_nees=float(squared.mean()),
         mean_nis=float(nis[used > 0].mean()) if used.any() else 0.0,
         readings=int(used.sum()),
-        refusals={
-            reason.name.lower(): int(n) for reason, n in zip(Refusal, estimates.refusals, strict=True) if n
+        rejections={
+            reason.name.lower(): int(n) for reason, n in zip(Rejection, estimates.rejections, strict=True) if n
         },
     )
 

@@ -8,19 +8,19 @@ from math import ceil
 
 import numpy as np
 
-from formation_gnc.interface import Matrix, Vector
-from formation_gnc.mission import Mission
+from formation_gnc.common import CommonParameters
 from formation_gnc.navigation import kernels
 from formation_gnc.orbit.elements import Elements
 from formation_gnc.relative.hill import HarmonicModel, HillModel
 from formation_gnc.relative.schweighart_sedwick import CircularReference, SchweighartSedwickModel
+from formation_gnc.types import Matrix, Vector
 
 LONGEST_STEP = 10.0
 """Integration step (s) above which a flight is divided, as in the plant."""
 
 
 @dataclass(slots=True)
-class Leg:
+class Interval:
     """A flight of the deputy beside the chief."""
 
     chief: Vector
@@ -39,13 +39,11 @@ class ProcessModel(ABC):
     """Moves relative states along a leg."""
 
     @abstractmethod
-    def predict(
-        self, leg: Leg, state: Vector, covariance: Matrix, noise: Matrix
-    ) -> tuple[Vector, Matrix, Matrix]:
+    def predict(self, leg: Interval, state: Vector, covariance: Matrix, noise: Matrix) -> tuple[Vector, Matrix, Matrix]:
         """State (6,), covariance with `noise` added (6, 6), and transition matrix (6, 6)."""
 
     @abstractmethod
-    def move(self, leg: Leg, points: Matrix) -> Matrix:
+    def move(self, leg: Interval, points: Matrix) -> Matrix:
         """Several relative states, (N, 6), alike."""
 
 
@@ -53,9 +51,7 @@ class NonlinearProcess(ProcessModel):
     """Two-body motion with J2 of both satellites: neither a circular chief nor a small separation is
     assumed."""
 
-    def predict(
-        self, leg: Leg, state: Vector, covariance: Matrix, noise: Matrix
-    ) -> tuple[Vector, Matrix, Matrix]:
+    def predict(self, leg: Interval, state: Vector, covariance: Matrix, noise: Matrix) -> tuple[Vector, Matrix, Matrix]:
         """In one kernel, the transition by the variational equations."""
         state, covariance, transition = state.copy(), covariance.copy(), np.empty((6, 6))
         kernels.fly(
@@ -71,7 +67,7 @@ class NonlinearProcess(ProcessModel):
         )
         return state, covariance, transition
 
-    def move(self, leg: Leg, points: Matrix) -> Matrix:
+    def move(self, leg: Interval, points: Matrix) -> Matrix:
         """Each in the inertial frame."""
         moved: Matrix = kernels.fly_points(
             leg.chief, leg.next_chief, points, leg.acceleration, leg.duration, leg.substeps
@@ -90,14 +86,12 @@ class LinearProcess(ProcessModel):
         """With the model's own transition matrices."""
         self._discretise = lru_cache(maxsize=64)(lambda duration: model.discretise(0.0, duration))
 
-    def predict(
-        self, leg: Leg, state: Vector, covariance: Matrix, noise: Matrix
-    ) -> tuple[Vector, Matrix, Matrix]:
+    def predict(self, leg: Interval, state: Vector, covariance: Matrix, noise: Matrix) -> tuple[Vector, Matrix, Matrix]:
         """x = Phi x + Gamma a."""
         phi, gamma = self._discretise(leg.duration)
         return phi @ state + gamma @ leg.acceleration, kernels.spread(phi, covariance, noise), phi
 
-    def move(self, leg: Leg, points: Matrix) -> Matrix:
+    def move(self, leg: Interval, points: Matrix) -> Matrix:
         """The same for several."""
         phi, gamma = self._discretise(leg.duration)
         moved: Matrix = points @ phi.T + gamma @ leg.acceleration
@@ -119,13 +113,13 @@ def process_noise(density: float, duration: float) -> Matrix:
     return density * np.block([[cubic, square], [square, duration * unit]])
 
 
-def _reference(mission: Mission) -> CircularReference:
-    return CircularReference.of(Elements(**vars(mission.chief)))
+def _reference(common: CommonParameters) -> CircularReference:
+    return CircularReference.of(Elements(**vars(common.chief)))
 
 
-PROCESS_MODELS: dict[str, Callable[[Mission], ProcessModel]] = {
-    "nonlinear_j2": lambda mission: NonlinearProcess(),
-    "schweighart_sedwick": lambda mission: LinearProcess(SchweighartSedwickModel(_reference(mission))),
-    "hill": lambda mission: LinearProcess(HillModel(mission.mean_motion)),
+PROCESS_MODELS: dict[str, Callable[[CommonParameters], ProcessModel]] = {
+    "nonlinear_j2": lambda common: NonlinearProcess(),
+    "schweighart_sedwick": lambda common: LinearProcess(SchweighartSedwickModel(_reference(common))),
+    "hill": lambda common: LinearProcess(HillModel(common.mean_motion)),
 }
 """The models to choose from, by name."""

@@ -1,18 +1,18 @@
 """The controller node: estimates and targets in, thrust out."""
 
-from formation_gnc.control.autopilot import Autopilot, ControllerParameters
-from formation_gnc.interface import NavigationState, Status, Target, Thrust
-from formation_gnc.nodes import topics
-from formation_gnc.nodes.shell import PartNode, run
-from formation_gnc.nodes.wires import Wires
+from formation_gnc.control.controller_manager import ControllerManager, ControllerParameters
+from formation_gnc.records import NavigationState, Status, Target, Thrust
+from formation_gnc.transport import topics
+from formation_gnc.transport.bus import IntraProcessBus
+from formation_gnc.transport.node import ModuleNode, run
 
 
-class ControllerNode(PartNode[Autopilot]):
+class ControllerNode(ModuleNode[ControllerManager]):
     """Answers each pair of estimate and target with a thrust command and a status."""
 
-    def __init__(self, wires: Wires | None = None) -> None:
+    def __init__(self, bus: IntraProcessBus | None = None) -> None:
         """Listen and speak in the deputy's namespace."""
-        super().__init__("controller", ControllerParameters, Autopilot, wires)
+        super().__init__("controller", ControllerParameters, ControllerManager, bus)
         self.publish_thrust = self.speak(Thrust, topics.THRUST)
         self.publish_status = self.speak(Status, topics.STATUS)
         self.answer(self.on_tick, {topics.ESTIMATE: NavigationState, topics.TARGET: Target})

@@ -16,21 +16,22 @@ from scipy.spatial.transform import Rotation
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from formation_gnc.interface import NANOSECONDS, SatelliteTruth, Target, Truth, Vector
-from formation_gnc.mission import ANY_ORBIT, Mission, Orbit
-from formation_gnc.nodes import topics
-from formation_gnc.nodes.conversion import from_cdr
-from formation_gnc.nodes.raw_topics import first_stamp
-from formation_gnc.nodes.shell import ConfiguredNode, run
+from formation_gnc.common import ANY_ORBIT, CommonParameters, Orbit
 from formation_gnc.orbit.frames import hill_rotation
 from formation_gnc.parameters import parameter
+from formation_gnc.records import SatelliteTruth, Target, Truth
+from formation_gnc.transport import topics
+from formation_gnc.transport.conversion import from_cdr
+from formation_gnc.transport.node import ConfiguredNode, run
+from formation_gnc.transport.raw_topics import first_stamp
+from formation_gnc.types import NANOSECONDS, Vector
 
 COLOURS = ((0.12, 0.47, 0.71), (1.0, 0.5, 0.05), (0.17, 0.63, 0.17), (0.84, 0.15, 0.16), (0.58, 0.4, 0.74))
 """Of the deputies in turn, red, green, blue."""
 
 
 @dataclass(frozen=True)
-class DisplayParameters(Mission):
+class DisplayParameters(CommonParameters):
     """How a run is drawn."""
 
     chief: Orbit = ANY_ORBIT
@@ -106,9 +107,7 @@ def transforms(truth: Truth) -> Iterator[TransformStamped]:
     turned = Rotation.from_matrix(hill_rotation(truth.chief_state).T).as_quat()
     yield _transform(truth.time, "inertial", "hill", truth.chief_state, turned)
     for deputy in truth.deputies:
-        yield _transform(
-            truth.time, "hill", deputy.name, deputy.relative_state, np.array([0.0, 0.0, 0.0, 1.0])
-        )
+        yield _transform(truth.time, "hill", deputy.name, deputy.relative_state, np.array([0.0, 0.0, 0.0, 1.0]))
 
 
 def _transform(time: int, parent: str, child: str, place: Vector, turned: Vector) -> TransformStamped:

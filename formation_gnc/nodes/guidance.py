@@ -1,18 +1,18 @@
 """The guidance node: estimates in, targets out; in a fleet, predicted separations too."""
 
-from formation_gnc.guidance.guide import GuidanceParameters, Guide
-from formation_gnc.interface import NavigationState, Separation, Target
-from formation_gnc.nodes import topics
-from formation_gnc.nodes.shell import PartNode, run
-from formation_gnc.nodes.wires import Wires
+from formation_gnc.guidance.guidance import Guidance, GuidanceParameters
+from formation_gnc.records import NavigationState, Separation, Target
+from formation_gnc.transport import topics
+from formation_gnc.transport.bus import IntraProcessBus
+from formation_gnc.transport.node import ModuleNode, run
 
 
-class GuidanceNode(PartNode[Guide]):
+class GuidanceNode(ModuleNode[Guidance]):
     """Answers each estimate with a target."""
 
-    def __init__(self, wires: Wires | None = None) -> None:
+    def __init__(self, bus: IntraProcessBus | None = None) -> None:
         """Listen and speak in the deputy's namespace, and listen to the others of a fleet."""
-        super().__init__("guidance", GuidanceParameters, Guide, wires)
+        super().__init__("guidance", GuidanceParameters, Guidance, bus)
         self.publish = self.say(Target, topics.TARGET)
         others = {f"/{name}/{topics.ESTIMATE}": NavigationState for name in self.part.others}
         self.answer(self.on_tick, {topics.ESTIMATE: NavigationState}, others)

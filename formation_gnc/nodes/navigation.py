@@ -1,18 +1,18 @@
 """The navigation node: measurements in, estimates out."""
 
-from formation_gnc.interface import Estimate, Measurement
-from formation_gnc.navigation.navigator import NavigationParameters, Navigator
-from formation_gnc.nodes import topics
-from formation_gnc.nodes.shell import PartNode, run
-from formation_gnc.nodes.wires import Wires
+from formation_gnc.navigation.navigation_filter import NavigationFilter, NavigationParameters
+from formation_gnc.records import Estimate, Measurement
+from formation_gnc.transport import topics
+from formation_gnc.transport.bus import IntraProcessBus
+from formation_gnc.transport.node import ModuleNode, run
 
 
-class NavigationNode(PartNode[Navigator]):
+class NavigationNode(ModuleNode[NavigationFilter]):
     """Answers each measurement with an estimate."""
 
-    def __init__(self, wires: Wires | None = None) -> None:
+    def __init__(self, bus: IntraProcessBus | None = None) -> None:
         """Listen and speak in the deputy's namespace."""
-        super().__init__("navigation", NavigationParameters, Navigator, wires)
+        super().__init__("navigation", NavigationParameters, NavigationFilter, bus)
         self.publish = self.say(Estimate, topics.ESTIMATE)
         self.answer(self.on_tick, {topics.MEASUREMENT: Measurement})
 

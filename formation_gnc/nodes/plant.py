@@ -8,11 +8,12 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy._rclpy_pybind11 import NodeNameNonExistentError
 from rosgraph_msgs.msg import Clock
 
-from formation_gnc.interface import NANOSECONDS, Event, Measurement, Thrust, Truth, Vector
-from formation_gnc.nodes import topics
-from formation_gnc.nodes.conversion import codec
-from formation_gnc.nodes.shell import ConfiguredNode, asked_to_stop, run
 from formation_gnc.plant.plant import Plant, PlantParameters
+from formation_gnc.records import Event, Measurement, Thrust, Truth
+from formation_gnc.transport import topics
+from formation_gnc.transport.conversion import codec
+from formation_gnc.transport.node import ConfiguredNode, asked_to_stop, run
+from formation_gnc.types import NANOSECONDS, Vector
 
 RECORDER_LAG = topics.DEPTH // 4
 """Ticks that the plant may be ahead of the recorder: well inside what the queues hold."""
@@ -133,9 +134,7 @@ class PlantNode(ConfiguredNode):
         if name in self._forces:
             return f"commanded {self._forces[name].tolist()} N"
         absent = [node for node in self._missing() if node.startswith(f"/{name}/")]
-        where = (
-            f" ({', '.join(absent)} not there)" if absent else ""
-        )  # a killed node is missed by DDS only later
+        where = f" ({', '.join(absent)} not there)" if absent else ""  # a killed node is missed by DDS only later
         return f"did not answer within {self.values.deadline:g} s{where}"
 
     def _publish_tick(self) -> None:
@@ -177,9 +176,7 @@ class PlantNode(ConfiguredNode):
 
     def _missing(self) -> Iterator[str]:
         """Full names of the nodes the run still waits for."""
-        there = {
-            f"{namespace.rstrip('/')}/{name}" for name, namespace in self.get_node_names_and_namespaces()
-        }
+        there = {f"{namespace.rstrip('/')}/{name}" for name, namespace in self.get_node_names_and_namespaces()}
         for deputy in self.values.deputies:
             for part in topics.PARTS:
                 if f"/{deputy}/{part}" not in there:

@@ -17,18 +17,19 @@ from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
-from formation_gnc.interface import NANOSECONDS, Event
-from formation_gnc.mission import Mission
-from formation_gnc.nodes import topics
-from formation_gnc.nodes.conversion import codec
-from formation_gnc.nodes.raw_topics import Hear, RawTopics
-from formation_gnc.nodes.shell import ConfiguredNode, asked_to_stop, run
+from formation_gnc.common import CommonParameters
 from formation_gnc.parameters import parameter
 from formation_gnc.recording.layout import LAYOUT, foxglove_layout
 from formation_gnc.recording.loss import LossCounter
 from formation_gnc.recording.provenance import LOST, parameters_record, provenance
 from formation_gnc.recording.snapshot import Snapshot
 from formation_gnc.recording.writer import FLUSH_INTERVAL, BagWriter, Split
+from formation_gnc.records import Event
+from formation_gnc.transport import topics
+from formation_gnc.transport.conversion import codec
+from formation_gnc.transport.node import ConfiguredNode, asked_to_stop, run
+from formation_gnc.transport.raw_topics import Hear, RawTopics
+from formation_gnc.types import NANOSECONDS
 
 LOOK_PERIOD = 0.1
 """Wall time (s) between looks for new topics and nodes, and between reports of progress."""
@@ -46,7 +47,7 @@ has come. It is listening that counts: one that gets no processor has heard noth
 
 
 @dataclass(frozen=True)
-class RecorderParameters(Mission):
+class RecorderParameters(CommonParameters):
     """Where to record to, and how much."""
 
     bag: str = parameter("", doc="directory to make for the bag; empty for bags/ and the date and time")

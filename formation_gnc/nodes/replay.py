@@ -9,15 +9,16 @@ from typing import Any
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import SetBool, Trigger
 
+from formation_gnc.common import ANY_ORBIT, CommonParameters, Orbit
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.interface import NANOSECONDS, Thrust
-from formation_gnc.mission import ANY_ORBIT, Mission, Orbit
-from formation_gnc.nodes import topics
-from formation_gnc.nodes.conversion import message_class
-from formation_gnc.nodes.raw_topics import first_stamp
-from formation_gnc.nodes.shell import ConfiguredNode, asked_to_stop, run
 from formation_gnc.parameters import parameter
 from formation_gnc.recording.reader import Bag
+from formation_gnc.records import Thrust
+from formation_gnc.transport import topics
+from formation_gnc.transport.conversion import message_class
+from formation_gnc.transport.node import ConfiguredNode, asked_to_stop, run
+from formation_gnc.transport.raw_topics import first_stamp
+from formation_gnc.types import NANOSECONDS
 
 BURST = 50
 """Ticks played at most before services are looked after again."""
@@ -27,7 +28,7 @@ CHECK_PERIOD = 0.002
 
 
 @dataclass(frozen=True)
-class ReplayParameters(Mission):
+class ReplayParameters(CommonParameters):
     """What to play, and how fast."""
 
     chief: Orbit = ANY_ORBIT
@@ -60,16 +61,13 @@ class ReplayNode(ConfiguredNode):
             raise ConfigurationError("parameter bag: missing; give a bag to play")
         if not self.values.start < self.values.end:
             raise ConfigurationError(
-                f"parameter end: {self.values.end} is not allowed; "
-                f"it must be above start, {self.values.start}"
+                f"parameter end: {self.values.end} is not allowed; it must be above start, {self.values.start}"
             )
         self.bag = Bag(self.values.bag)
         measured = [topic for topic in self.bag.topics if topic.endswith(f"/{topics.MEASUREMENT}")]
         default = [*measured, *(topic for topic in self.bag.topics if topic == topics.TRUTH)]
         names = [name for name in self.values.topics or default if name != topics.CLOCK]
-        self._played = {
-            name: self.create_publisher(self._type(name), name, topics.quality()) for name in names
-        }
+        self._played = {name: self.create_publisher(self._type(name), name, topics.quality()) for name in names}
         self._tell_time = self.create_publisher(Clock, topics.CLOCK, topics.quality())
         self._answers = {
             name.replace(topics.MEASUREMENT, topics.THRUST) for name in names if name in measured
@@ -87,9 +85,7 @@ class ReplayNode(ConfiguredNode):
 
     def _type(self, topic: str) -> Any:
         if topic not in self.bag.topics:
-            raise ConfigurationError(
-                f"topic {topic}: not in the bag; it has {', '.join(sorted(self.bag.topics))}"
-            )
+            raise ConfigurationError(f"topic {topic}: not in the bag; it has {', '.join(sorted(self.bag.topics))}")
         try:
             kind = message_class(self.bag.topics[topic].type_name)
         except ConfigurationError as error:

@@ -7,8 +7,8 @@ from hand to hand.
 from formation_gnc.nodes.controller import ControllerNode
 from formation_gnc.nodes.guidance import GuidanceNode
 from formation_gnc.nodes.navigation import NavigationNode
-from formation_gnc.nodes.shell import run, serve
-from formation_gnc.nodes.wires import Wires
+from formation_gnc.transport.bus import IntraProcessBus
+from formation_gnc.transport.node import run, serve
 
 
 class Satellite:
@@ -16,8 +16,8 @@ class Satellite:
 
     def __init__(self) -> None:
         """Make the nodes, who speaks before who listens."""
-        wires = Wires()
-        self.nodes = NavigationNode(wires), GuidanceNode(wires), ControllerNode(wires)
+        bus = IntraProcessBus()
+        self.nodes = NavigationNode(bus), GuidanceNode(bus), ControllerNode(bus)
 
     def spin(self) -> None:
         """Work until asked to stop."""

@@ -57,7 +57,7 @@ def eclipses(state: Array, duration: float, step: float, epoch: float = 0.0) -> 
 def _between(start: Array, end: Array, share: float, step: float) -> Array:
     """Position (3,) at a share of the step between two states: Hermite's cubic."""
     rest = 1.0 - share
-    position: Array = rest * rest * (
-        (1.0 + 2.0 * share) * start[:3] + share * step * start[3:]
-    ) + share * share * ((1.0 + 2.0 * rest) * end[:3] - rest * step * end[3:])
+    position: Array = rest * rest * ((1.0 + 2.0 * share) * start[:3] + share * step * start[3:]) + share * share * (
+        (1.0 + 2.0 * rest) * end[:3] - rest * step * end[3:]
+    )
     return position

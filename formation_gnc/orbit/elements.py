@@ -38,7 +38,7 @@ class Elements:
     true_anomaly: float
 
     def __post_init__(self) -> None:
-        """Refuse what is not a closed orbit clear of the Earth."""
+        """Reject what is not a closed orbit clear of the Earth."""
         for field in fields(self):
             value = getattr(self, field.name)
             if not isfinite(value):
@@ -51,8 +51,7 @@ class Elements:
             raise ConfigurationError(f"inclination is {self.inclination} rad: it must be in [0, pi]")
         if self.perigee_radius < EARTH_RADIUS:
             raise ConfigurationError(
-                f"perigee radius is {self.perigee_radius:.1f} m: "
-                f"it must be at least the Earth's, {EARTH_RADIUS:.1f} m"
+                f"perigee radius is {self.perigee_radius:.1f} m: it must be at least the Earth's, {EARTH_RADIUS:.1f} m"
             )
 
     @property
@@ -127,8 +126,7 @@ def elements_from_state(state: Array, mu: float = MU) -> Elements:
     inverse_axis = 2.0 / radius - (vx * vx + vy * vy + vz * vz) / mu
     if inverse_axis <= 0.0:
         raise ConfigurationError(
-            f"specific orbital energy is {-0.5 * mu * inverse_axis:.6g} J/kg: "
-            "it must be below zero (a closed orbit)"
+            f"specific orbital energy is {-0.5 * mu * inverse_axis:.6g} J/kg: it must be below zero (a closed orbit)"
         )
     hx, hy, hz = hx / h, hy / h, hz / h
     sin_i = hypot(hx, hy)

@@ -59,8 +59,7 @@ def hill_rotation(chief: Array) -> Array:
     momentum = sqrt(hx * hx + hy * hy + hz * hz)
     if not (radius > 0.0 and momentum > 0.0):
         raise ConfigurationError(
-            f"chief state {list(map(float, chief))} has no orbit plane: "
-            "radius and angular momentum must be above zero"
+            f"chief state {list(map(float, chief))} has no orbit plane: radius and angular momentum must be above zero"
         )
     rx, ry, rz = rx / radius, ry / radius, rz / radius
     hx, hy, hz = hx / momentum, hy / momentum, hz / momentum

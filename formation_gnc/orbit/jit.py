@@ -52,7 +52,7 @@ def kernel[F: Callable[..., Any]](signature: Any) -> Callable[[F], F]:
     Without fastmath and threads: the same input gives the same bits. Division by zero follows IEEE 754.
 
     Args:
-        signature: numba signature; arguments of other types are refused, layouts are as declared.
+        signature: numba signature; arguments of other types are rejected, layouts are as declared.
     """
 
     def compile_function(function: F) -> F:

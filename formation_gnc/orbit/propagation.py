@@ -66,9 +66,7 @@ def _advance(
                         change += coupling[i, j] * rates[j, c]
                     stage[c] = states[satellite, c] + step * change
                 x, y, z, vx, vy, vz = stage
-                ax, ay, az = acceleration(
-                    on, sky[INSTANT_OF_STAGE[i]], drag_area, light_area, x, y, z, vx, vy, vz
-                )
+                ax, ay, az = acceleration(on, sky[INSTANT_OF_STAGE[i]], drag_area, light_area, x, y, z, vx, vy, vz)
                 rates[i, 0], rates[i, 1], rates[i, 2] = vx, vy, vz
                 rates[i, 3] = ax + thrust[satellite, 0]
                 rates[i, 4] = ay + thrust[satellite, 1]
@@ -138,9 +136,7 @@ class Propagator:
             raise ConfigurationError(f"epoch is {epoch} s: it must be finite")
         forces = forces or Forces()
         if (forces.drag or forces.radiation_pressure) and not bodies:
-            raise ConfigurationError(
-                "bodies is empty: drag and radiation pressure need one for each satellite"
-            )
+            raise ConfigurationError("bodies is empty: drag and radiation pressure need one for each satellite")
         for body in bodies:
             for leaf in leaves(Body, {}):
                 leaf.check(getattr(body, leaf.name))
@@ -181,9 +177,7 @@ class Propagator:
         masses: Array,
     ) -> Array:
         if len(self._areas) not in (0, len(states)):
-            raise ConfigurationError(
-                f"{len(self._areas)} bodies for {len(states)} satellites: each needs one"
-            )
+            raise ConfigurationError(f"{len(self._areas)} bodies for {len(states)} satellites: each needs one")
         result = states.copy()
         fallen = move(
             result,
@@ -213,9 +207,7 @@ class Propagator:
 
 
 @kernel((ANY_VECTOR, ANY_VECTOR, float64, int64))
-def advance_with_transition(
-    state: Array, acceleration: Array, tick: float, substeps: int = 1
-) -> tuple[Array, Array]:
+def advance_with_transition(state: Array, acceleration: Array, tick: float, substeps: int = 1) -> tuple[Array, Array]:
     """State and state transition matrix after a tick, point mass with J2: what a filter predicts with.
 
     Args:

@@ -30,9 +30,7 @@ def sun(time: float) -> tuple[float, float, float]:
     centuries = time / _CENTURY
     anomaly = _turn(0.9931267 + 99.9973583 * centuries)
     centre = (6892.0 * sin(anomaly) + 72.0 * sin(2.0 * anomaly)) * _ARCSECOND
-    perigee = (
-        0.7859444 + 0.00089798 * centuries
-    )  # its drift is absent from the book's series, 0.16 deg by 2050
+    perigee = 0.7859444 + 0.00089798 * centuries  # its drift is absent from the book's series, 0.16 deg by 2050
     longitude = _turn(perigee) + anomaly + centre
     distance = (149.619 - 2.499 * cos(anomaly) - 0.021 * cos(2.0 * anomaly)) * 1e9
     across = distance * sin(longitude)

@@ -7,9 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
+from formation_gnc.common import LAST_SECOND, CommonParameters
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.interface import NANOSECONDS, Event, Measurement, SatelliteTruth, Truth, Vector
-from formation_gnc.mission import LAST_SECOND, Mission
 from formation_gnc.orbit.elements import Elements, elements_from_state, state_from_elements
 from formation_gnc.orbit.forces import Body, Forces
 from formation_gnc.orbit.frames import (
@@ -22,6 +21,8 @@ from formation_gnc.parameters import parameter, per_name
 from formation_gnc.plant.sensors import Sensors, SensorSuite
 from formation_gnc.plant.thrusters import NO_FORCE, Denial, Thruster, ThrusterParameters, ThrusterState
 from formation_gnc.randomness import generator
+from formation_gnc.records import Event, Measurement, SatelliteTruth, Truth
+from formation_gnc.types import NANOSECONDS, Vector
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,13 +41,11 @@ class DeputyParameters(Body):
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlantParameters(Mission):
+class PlantParameters(CommonParameters):
     """The run and its satellites."""
 
     seed: int = parameter(1, minimum=0, doc="seed of every random number of the run")
-    duration: float = parameter(
-        unit="s", above=0.0, maximum=LAST_SECOND, doc="simulated time to fly, whole ticks"
-    )
+    duration: float = parameter(unit="s", above=0.0, maximum=LAST_SECOND, doc="simulated time to fly, whole ticks")
     real_time_factor: float = parameter(
         0.0, minimum=0.0, doc="simulated seconds per wall second at most; 0 for as fast as possible"
     )
@@ -70,8 +69,7 @@ class PlantParameters(Mission):
         super().__post_init__()
         if len(set(self.deputies)) != len(self.deputies) or not self.deputies:
             raise ConfigurationError(
-                f"parameter deputies: {list(self.deputies)} is not allowed; "
-                "it must be one or more different names"
+                f"parameter deputies: {list(self.deputies)} is not allowed; it must be one or more different names"
             )
         for name in self.deputies:
             if not (name.isidentifier() and name.isascii()):
@@ -242,8 +240,7 @@ def _start(chief: Vector, name: str, deputy: DeputyParameters) -> Vector:
     relative = np.array(deputy.relative_state)
     if not relative[:3].any():
         raise ConfigurationError(
-            f"parameter {name}.relative_state: {relative.tolist()} is not allowed; "
-            "its position must be off the chief's"
+            f"parameter {name}.relative_state: {relative.tolist()} is not allowed; its position must be off the chief's"
         )
     state = inertial_from_relative(chief, relative)
     try:

@@ -7,9 +7,10 @@ from math import atan2, gcd, hypot, sqrt
 import numpy as np
 
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.interface import NANOSECONDS, Sensor, Vector
 from formation_gnc.parameters import parameter
 from formation_gnc.randomness import generator
+from formation_gnc.records import Sensor
+from formation_gnc.types import NANOSECONDS, Vector
 
 DRAWN_AHEAD = 16
 """Readings whose random numbers are drawn at a time: a draw on its own, amid other work, costs a multiple."""
@@ -20,17 +21,11 @@ class SensorParameters:
     """Error model of one sensor."""
 
     on: bool = parameter(True, doc="whether the sensor reads at all")
-    sigma: float = parameter(
-        1.0, minimum=0.0, doc="standard deviation of the noise, in the unit of the reading"
-    )
+    sigma: float = parameter(1.0, minimum=0.0, doc="standard deviation of the noise, in the unit of the reading")
     bias: float = parameter(0.0, doc="constant error, in the unit of the reading")
     interval: float = parameter(10.0, unit="s", above=0.0, doc="time between readings; whole ticks")
-    latency: float = parameter(
-        0.0, unit="s", minimum=0.0, doc="time from a reading to its delivery; whole ticks"
-    )
-    dropout: float = parameter(
-        0.0, minimum=0.0, maximum=1.0, doc="probability that a reading is never delivered"
-    )
+    latency: float = parameter(0.0, unit="s", minimum=0.0, doc="time from a reading to its delivery; whole ticks")
+    dropout: float = parameter(0.0, minimum=0.0, maximum=1.0, doc="probability that a reading is never delivered")
     outlier: float = parameter(0.0, minimum=0.0, maximum=1.0, doc="probability that a reading is an outlier")
     outlier_size: float = parameter(
         50.0, minimum=0.0, doc="error of an outlier, of either sign, in standard deviations"
@@ -46,9 +41,7 @@ class SensorSuite:
     latitude: SensorParameters = SensorParameters(sigma=1e-6)
     right_ascension: SensorParameters = SensorParameters(on=False, sigma=1e-6)
     chief_range: SensorParameters = SensorParameters(on=False, sigma=1.0)
-    outage_start: float = parameter(
-        0.0, unit="s", minimum=0.0, doc="time from which no sensor reads for a while"
-    )
+    outage_start: float = parameter(0.0, unit="s", minimum=0.0, doc="time from which no sensor reads for a while")
     outage_duration: float = parameter(0.0, unit="s", minimum=0.0, doc="how long; 0 for never")
     fix_position_sigma: float = parameter(
         0.5, unit="m", minimum=0.0, doc="standard deviation of an acquisition fix, each axis"
@@ -135,9 +128,7 @@ class Sensors:
             ConfigurationError: an interval or a latency that is not a whole number of ticks.
         """
         suite = [(sensor, getattr(parameters, sensor.name.lower())) for sensor in Sensor]
-        self._instruments = [
-            _Instrument(sensor, model, tick_ns, seed, deputy) for sensor, model in suite if model.on
-        ]
+        self._instruments = [_Instrument(sensor, model, tick_ns, seed, deputy) for sensor, model in suite if model.on]
         self._beat = gcd(*(instrument.beat for instrument in self._instruments))
         """Ticks between which nothing is read and nothing arrives; 0 when no sensor is on."""
         self._fixes = generator(seed, f"{deputy}/fixes")

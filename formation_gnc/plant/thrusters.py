@@ -8,8 +8,8 @@ from math import copysign, exp, hypot, isfinite
 import numpy as np
 
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.interface import Vector
 from formation_gnc.parameters import parameter
+from formation_gnc.types import Vector
 
 NO_FORCE = (0.0, 0.0, 0.0)
 
@@ -34,9 +34,7 @@ class ThrusterParameters:
     minimum_impulse: float = parameter(
         0.0, unit="N s", minimum=0.0, doc="smallest impulse per axis and tick; a smaller one does not fire"
     )
-    quantum: float = parameter(
-        0.0, unit="N", minimum=0.0, doc="step between forces per axis; 0 for continuous"
-    )
+    quantum: float = parameter(0.0, unit="N", minimum=0.0, doc="step between forces per axis; 0 for continuous")
     lag: float = parameter(0.0, unit="s", minimum=0.0, doc="time constant of the force's rise and fall")
     misalignment: float = parameter(
         0.0,
@@ -59,9 +57,7 @@ class ThrusterParameters:
     )
     dry_mass: float = parameter(0.0, unit="kg", minimum=0.0, doc="mass at which the tank is empty")
     off_in_eclipse: bool = parameter(False, doc="no thrust while any of the Sun is hidden")
-    failed: tuple[bool, ...] = parameter(
-        (False, False, False), length=3, doc="axes whose thruster does not fire"
-    )
+    failed: tuple[bool, ...] = parameter((False, False, False), length=3, doc="axes whose thruster does not fire")
 
 
 class Denial(StrEnum):

@@ -194,9 +194,7 @@ def _native(column: NDArray[Any]) -> NDArray[Any]:
 def _gather(parts: list[tuple[list[int], NDArray[Any]]], total: int) -> NDArray[Any]:
     """Put the rows of several groups back in their order."""
     first = parts[0][1]
-    if sum(len(rows) for rows, _ in parts) == total and all(
-        part.shape[1:] == first.shape[1:] for _, part in parts
-    ):
+    if sum(len(rows) for rows, _ in parts) == total and all(part.shape[1:] == first.shape[1:] for _, part in parts):
         if len(parts) == 1:
             return first
         column = np.empty((total, *first.shape[1:]), dtype=np.result_type(*(part for _, part in parts)))

@@ -40,9 +40,7 @@ def foxglove_layout(deputies: Sequence[str]) -> str:
             xAxisPath={"value": f"{truth}[1]", "enabled": True},
         )
         state = plot(f"{name}-truth", "True relative position [m]", by_axis(truth))
-        estimate = plot(
-            f"{name}-estimate", "Estimated position [m]", by_axis(f"/{name}/estimate.relative_state")
-        )
+        estimate = plot(f"{name}-estimate", "Estimated position [m]", by_axis(f"/{name}/estimate.relative_state"))
         target = plot(f"{name}-target", "Target position [m]", by_axis(f"/{name}/target.relative_state"))
         thrust = plot(f"{name}-thrust", "Thrust [N]", by_axis(f"/{name}/thrust.force"))
         timing = plot(

@@ -78,9 +78,7 @@ class LiveView:
 
     def add(self, topic: str, definition: TopicDefinition) -> None:
         """Offer a topic."""
-        schema = foxglove.Schema(
-            name=definition.type_name, encoding=definition.schema_encoding, data=definition.schema
-        )
+        schema = foxglove.Schema(name=definition.type_name, encoding=definition.schema_encoding, data=definition.schema)
         self._channels[topic] = foxglove.Channel(
             topic, schema=schema, message_encoding=definition.message_encoding, context=self._context
         )
@@ -130,9 +128,7 @@ class Player(ServerListener):
         for topic in bag.topics:
             schema, channel = bag.definition(topic)
             if schema is not None:
-                definition = TopicDefinition(
-                    schema.name, schema.data, schema.encoding, channel.message_encoding
-                )
+                definition = TopicDefinition(schema.name, schema.data, schema.encoding, channel.message_encoding)
                 self.view.add(topic, definition)
 
     def on_playback_control_request(self, playback_control_request: PlaybackControlRequest) -> PlaybackState:

@@ -85,9 +85,7 @@ class McapFile:
         for span in self.spans:
             if span.end >= start_ns and span.start < end_ns:
                 for message in self.span_messages(span):
-                    if (channels is None or message.channel_id in channels) and (
-                        start_ns <= message.log_time < end_ns
-                    ):
+                    if (channels is None or message.channel_id in channels) and (start_ns <= message.log_time < end_ns):
                         yield message
 
     def span_messages(self, span: Span) -> Iterator[Message]:

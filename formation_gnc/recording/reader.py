@@ -126,9 +126,7 @@ class Bag:
         """
         return self._as_arrays(topic, [(data, stamp) for _, data, stamp in self.messages([topic])])
 
-    def batches(
-        self, topics: Sequence[str], size: int = 1024
-    ) -> Iterator[tuple[str, dict[str, NDArray[Any]]]]:
+    def batches(self, topics: Sequence[str], size: int = 1024) -> Iterator[tuple[str, dict[str, NDArray[Any]]]]:
         """Messages as (topic, `arrays` of some of them), in one reading, for bags of any length.
 
         Each topic's come in recorded order, `size` at a time.
@@ -213,9 +211,7 @@ class Bag:
         if topic not in self._types:
             schema, channel = self.definition(topic)
             if schema is None or channel.message_encoding != "cdr":
-                raise ConfigurationError(
-                    f"{self.path}: topic {topic} has no message definition, or is not CDR"
-                )
+                raise ConfigurationError(f"{self.path}: topic {topic} has no message definition, or is not CDR")
             self._types[topic] = MessageType(schema.name, schema.data, schema.encoding)
         return self._types[topic]
 
@@ -263,9 +259,7 @@ def _side_by_side(
         yield stamp, topic, sides.get(0, []), sides.get(1, [])
 
 
-def _field_difference(
-    kind: MessageType, one: bytes, other_kind: MessageType, other: bytes
-) -> tuple[str, Any, Any]:
+def _field_difference(kind: MessageType, one: bytes, other_kind: MessageType, other: bytes) -> tuple[str, Any, Any]:
     """Name of the first field in which two messages differ, and both values."""
     fields, other_fields = kind.arrays([one]), other_kind.arrays([other])
     for field in fields | other_fields:

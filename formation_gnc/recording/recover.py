@@ -229,14 +229,8 @@ def _walk(stream: BinaryIO, reasons: list[str]) -> Iterator[McapRecord | _Piece]
             yield record
         if isinstance(record, DataEnd):
             closed = True
-            if (
-                record.data_section_crc
-                and record.data_section_crc != _checksum(stream, offset)
-                and not reasons
-            ):
-                reasons.append(
-                    f"{stream.name}: checksum wrong outside the chunks, in metadata or message index"
-                )
+            if record.data_section_crc and record.data_section_crc != _checksum(stream, offset) and not reasons:
+                reasons.append(f"{stream.name}: checksum wrong outside the chunks, in metadata or message index")
         offset = end
     if not closed:
         reasons.append(f"{stream.name}: was not closed, what came last may be missing")

@@ -67,6 +67,4 @@ def _installed(type_name: str, suffix: str) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except OSError as error:
-        raise ConfigurationError(
-            f"message type {type_name!r}: cannot read {path}: {error.strerror}"
-        ) from None
+        raise ConfigurationError(f"message type {type_name!r}: cannot read {path}: {error.strerror}") from None

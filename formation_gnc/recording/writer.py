@@ -46,7 +46,7 @@ class Split:
     max_duration: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse limits that no file can keep."""
+        """Reject limits that no file can keep."""
         for name, value in (("max_bytes", self.max_bytes), ("max_duration", self.max_duration)):
             if value is not None and not value > 0:
                 raise ConfigurationError(f"split {name} = {value}: must be above 0")
@@ -134,9 +134,7 @@ class BagWriter:
                 f"bag directory {self.directory}: exists already; name another or remove it"
             ) from None
         except OSError as error:
-            raise ConfigurationError(
-                f"bag directory {self.directory}: cannot be made: {error.strerror}"
-            ) from None
+            raise ConfigurationError(f"bag directory {self.directory}: cannot be made: {error.strerror}") from None
         with self._guarded():
             self._start_file()
 
@@ -261,13 +259,9 @@ class BagWriter:
         file = self._file
         schema = file.schemas.get(definition.type_name)
         if schema is None:
-            schema = file.mcap.register_schema(
-                definition.type_name, definition.schema_encoding, definition.schema
-            )
+            schema = file.mcap.register_schema(definition.type_name, definition.schema_encoding, definition.schema)
             file.schemas[definition.type_name] = schema
-        return file.mcap.register_channel(
-            topic, definition.message_encoding, schema, dict(definition.metadata)
-        )
+        return file.mcap.register_channel(topic, definition.message_encoding, schema, dict(definition.metadata))
 
     def _is_full(self, split: Split, stamp_ns: int) -> bool:
         file = self._file
@@ -314,9 +308,7 @@ class BagWriter:
             }
             for name, entry in self._topics.items()
         ]
-        files = [
-            {"path": file.path.name, **_span([file]), "message_count": file.count} for file in self._files
-        ]
+        files = [{"path": file.path.name, **_span([file]), "message_count": file.count} for file in self._files]
         information = {
             "version": 9,
             "storage_identifier": "mcap",

@@ -119,7 +119,7 @@ class KeplerChief(Chief):
     mu: float = MU
 
     def __post_init__(self) -> None:
-        """Refuse what is no ellipse."""
+        """Reject what is no ellipse."""
         for name, value in vars(self).items():
             if not math.isfinite(value):
                 raise ConfigurationError(f"{name} is {value}: it must be finite")
@@ -253,9 +253,7 @@ def _oblate_inertial(chief: OblateChief, time: float) -> Array:
     while len(knots) <= index:
         knots.append(advance_with_transition(knots[-1], NO_THRUST, step, 1)[0])
     rest = time - index * step
-    state: Array = advance_with_transition(
-        knots[index], NO_THRUST, rest, max(1, math.ceil(abs(rest) / step))
-    )[0]
+    state: Array = advance_with_transition(knots[index], NO_THRUST, rest, max(1, math.ceil(abs(rest) / step)))[0]
     state.setflags(write=False)
     return state
 

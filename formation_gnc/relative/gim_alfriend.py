@@ -41,7 +41,7 @@ class GimAlfriendModel(LinearModel):
     """Osculating elements of the chief at time zero."""
 
     def __post_init__(self) -> None:
-        """Refuse a chief without a node."""
+        """Reject a chief without a node."""
         if math.sin(self.elements.inclination) < LOWEST_INCLINATION:
             raise ConfigurationError(
                 f"inclination is {self.elements.inclination} rad: the Gim-Alfriend model needs a node, "

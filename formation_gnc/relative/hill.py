@@ -100,9 +100,7 @@ class HarmonicModel(LinearModel):
         gamma[..., 5, 2] = normal_sine / p
         return self.transition(time, tick), gamma
 
-    def propagate(
-        self, time: float, state: Array, duration: ArrayLike, acceleration: Array = NO_THRUST
-    ) -> Array:
+    def propagate(self, time: float, state: Array, duration: ArrayLike, acceleration: Array = NO_THRUST) -> Array:
         """(..., 6) states after durations (...,) under a held acceleration, all broadcast together."""
         phi, gamma = self.discretise(time, duration)
         free: Array = (phi @ np.asarray(state)[..., None])[..., 0]
@@ -124,11 +122,9 @@ class HillModel(HarmonicModel):
     """Angular rate of the chief, rad/s."""
 
     def __post_init__(self) -> None:
-        """Refuse a rate that is not one."""
+        """Reject a rate that is not one."""
         if not (math.isfinite(self.mean_motion) and self.mean_motion > 0.0):
-            raise ConfigurationError(
-                f"mean_motion is {self.mean_motion} rad/s: it must be positive and finite"
-            )
+            raise ConfigurationError(f"mean_motion is {self.mean_motion} rad/s: it must be positive and finite")
 
     @property
     def frequencies(self) -> tuple[float, float, float]:

@@ -28,14 +28,12 @@ class CircularReference:
     """Argument of latitude at time zero, rad."""
 
     def __post_init__(self) -> None:
-        """Refuse what is no orbit."""
+        """Reject what is no orbit."""
         for name, value in vars(self).items():
             if not math.isfinite(value):
                 raise ConfigurationError(f"{name} is {value}: it must be finite")
         if not self.radius > EARTH_RADIUS:
-            raise ConfigurationError(
-                f"radius is {self.radius} m: it must be above the Earth's, {EARTH_RADIUS} m"
-            )
+            raise ConfigurationError(f"radius is {self.radius} m: it must be above the Earth's, {EARTH_RADIUS} m")
 
     @classmethod
     def of(cls, elements: Elements) -> "CircularReference":
@@ -113,9 +111,7 @@ class SchweighartSedwickModel(HarmonicModel):
         """
         reference = self.reference
         result = self.centred(0.0, state)
-        kick = (
-            0.75 * reference.oblateness * reference.mean_motion**2 * reference.radius / reference.nodal_rate
-        )
+        kick = 0.75 * reference.oblateness * reference.mean_motion**2 * reference.radius / reference.nodal_rate
         result[..., 4] += kick * math.sin(reference.inclination) ** 2
         return result
 

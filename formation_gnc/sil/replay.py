@@ -16,17 +16,18 @@ from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
 
-from formation_gnc.control.autopilot import Autopilot, ControllerParameters
+from formation_gnc.control.controller_manager import ControllerManager, ControllerParameters
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.guidance.guide import GuidanceParameters, Guide
-from formation_gnc.interface import NANOSECONDS, EstimateStatus, Event, Timing
-from formation_gnc.meeting import Meeting
-from formation_gnc.navigation.navigator import NavigationParameters, Navigator
+from formation_gnc.flight.module import FlightModule, changes_told, text_of
+from formation_gnc.flight.synchronizer import StampSynchronizer
+from formation_gnc.guidance.guidance import Guidance, GuidanceParameters
+from formation_gnc.navigation.navigation_filter import NavigationFilter, NavigationParameters
 from formation_gnc.parameters import OWN_OF_ROS, dump, leaves, load, read_yaml
-from formation_gnc.part import Part, changes_told, text_of
 from formation_gnc.recording.provenance import parameters_record
 from formation_gnc.recording.reader import Bag
+from formation_gnc.records import EstimateStatus, Event, Timing
 from formation_gnc.sil.runner import Sink
+from formation_gnc.types import NANOSECONDS
 
 
 @dataclass(frozen=True)
@@ -40,9 +41,9 @@ class Kind:
 
 
 KINDS = {
-    "navigation": Kind(NavigationParameters, Navigator, ("measurement",), ("estimate",)),
-    "guidance": Kind(GuidanceParameters, Guide, ("estimate",), ("target", "separation")),
-    "controller": Kind(ControllerParameters, Autopilot, ("estimate", "target"), ("thrust", "status")),
+    "navigation": Kind(NavigationParameters, NavigationFilter, ("measurement",), ("estimate",)),
+    "guidance": Kind(GuidanceParameters, Guidance, ("estimate",), ("target", "separation")),
+    "controller": Kind(ControllerParameters, ControllerManager, ("estimate", "target"), ("thrust", "status")),
 }
 
 Read = Callable[[str, bytes], Any]
@@ -74,8 +75,8 @@ class ReplayedPart:
         fleet = getattr(parameters, "fleet", ())
         self.others = [f"/{name}/estimate" for name in fleet if name != deputy]
         """Inputs that may be missing."""
-        self._part: Part[Any, Any] = self.kind.build(self.node, self.parameters)
-        self._meeting = Meeting((*self.inputs, *self.others), len(self.inputs))
+        self._part: FlightModule[Any, Any] = self.kind.build(self.node, self.parameters)
+        self._meeting = StampSynchronizer((*self.inputs, *self.others), len(self.inputs))
 
     def meet(self, records: Mapping[str, Any]) -> list[Any] | None:
         """Its inputs at a tick, of the records there are by topic; none when it could not answer."""
@@ -94,7 +95,7 @@ class ReplayedPart:
             if changes in ours:
                 ours.remove(changes)  # the schedule brings it about by itself
             else:
-                self._part.adopt(self._part.prepare(self._typed(changes)))
+                self._part.commit(self._part.stage(self._typed(changes)))
         answer = self._part.on_tick(*inputs)  # type: ignore[attr-defined]
         records = () if answer is None else answer if isinstance(answer, tuple) else (answer,)
         return records, self._part.take_events()
@@ -129,17 +130,13 @@ def nodes_of(bag: Bag, kinds: Collection[str]) -> list[str]:
     unknown = [kind for kind in kinds if kind not in KINDS]
     if unknown or not kinds:
         raise ConfigurationError(f"nodes {', '.join(unknown) or 'none'}: must be some of {', '.join(KINDS)}")
-    deputies = sorted(
-        topic.split("/")[1] for topic in bag.topics if re.fullmatch("/[^/]+/measurement", topic)
-    )
+    deputies = sorted(topic.split("/")[1] for topic in bag.topics if re.fullmatch("/[^/]+/measurement", topic))
     if not deputies:
         raise ConfigurationError(f"{bag.path}: has no measurements to fly again")
     return [f"/{deputy}/{kind}" for kind in KINDS if kind in kinds for deputy in deputies]
 
 
-def replay(
-    bag: Bag, parameters: Mapping[str, Mapping[str, Any]], read: Read, sink: Sink, copy: Copy
-) -> list[str]:
+def replay(bag: Bag, parameters: Mapping[str, Mapping[str, Any]], read: Read, sink: Sink, copy: Copy) -> list[str]:
     """Fly a bag's inputs through parts again, tick by tick.
 
     Args:

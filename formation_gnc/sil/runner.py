@@ -3,14 +3,15 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from formation_gnc.control.autopilot import Autopilot
-from formation_gnc.guidance.guide import Guide
-from formation_gnc.interface import Estimate, Event, Thrust, Vector
-from formation_gnc.meeting import Meeting
-from formation_gnc.navigation.navigator import Navigator
-from formation_gnc.part import Part
+from formation_gnc.control.controller_manager import ControllerManager
+from formation_gnc.flight.module import FlightModule
+from formation_gnc.flight.synchronizer import StampSynchronizer
+from formation_gnc.guidance.guidance import Guidance
+from formation_gnc.navigation.navigation_filter import NavigationFilter
 from formation_gnc.plant.plant import Plant
+from formation_gnc.records import Estimate, Event, Thrust
 from formation_gnc.sil.scenario import Scenario
+from formation_gnc.types import Vector
 
 Sink = Callable[[str, Any], None]
 """Takes a topic and the record that the node graph would publish on it."""
@@ -23,11 +24,11 @@ class Satellite:
         """Build the three parts from the scenario."""
         setup = scenario.deputies[name]
         self.name = name
-        self.navigator = Navigator(f"/{name}/navigation", setup.navigation)
-        self.guide = Guide(f"/{name}/guidance", setup.guidance)
-        self.autopilot = Autopilot(f"/{name}/controller", setup.controller)
-        self._meeting = Meeting((name, *self.guide.others), needed=1)
-        self.parts: tuple[Part[Any, Any], ...] = (self.navigator, self.guide, self.autopilot)
+        self.navigator = NavigationFilter(f"/{name}/navigation", setup.navigation)
+        self.guide = Guidance(f"/{name}/guidance", setup.guidance)
+        self.autopilot = ControllerManager(f"/{name}/controller", setup.controller)
+        self._meeting = StampSynchronizer((name, *self.guide.others), needed=1)
+        self.parts: tuple[FlightModule[Any, Any], ...] = (self.navigator, self.guide, self.autopilot)
 
     def on_tick(self, estimates: Mapping[str, Estimate | None], sink: Sink) -> Thrust | None:
         """From the estimates of all deputies to thrust; none when there is nothing to act on."""

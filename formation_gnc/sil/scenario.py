@@ -11,10 +11,10 @@ from typing import Any
 import yaml
 
 import formation_gnc
-from formation_gnc.control.autopilot import ControllerParameters
+from formation_gnc.control.controller_manager import ControllerParameters
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.guidance.guide import GuidanceParameters, check_places
-from formation_gnc.navigation.navigator import NavigationParameters
+from formation_gnc.guidance.guidance import GuidanceParameters, check_places
+from formation_gnc.navigation.navigation_filter import NavigationParameters
 from formation_gnc.parameters import dump, load, read_yaml
 from formation_gnc.plant.plant import PlantParameters
 
@@ -105,9 +105,7 @@ def find_scenario(name: str) -> Path:
         if (directory / f"{name}.yaml").is_file():
             return directory / f"{name}.yaml"
     known = sorted(path.stem for directory in directories for path in directory.glob("*.yaml"))
-    raise ConfigurationError(
-        f"scenario {name}: unknown; it must be a parameter file or one of {', '.join(known)}"
-    )
+    raise ConfigurationError(f"scenario {name}: unknown; it must be a parameter file or one of {', '.join(known)}")
 
 
 def given_to(path: Path, node: str) -> dict[str, Any]:
@@ -146,8 +144,7 @@ def _given(sections: list[tuple[str, Mapping[str, Any]]], node: str) -> dict[str
 def _matches(pattern: str, node: str) -> bool:
     """Whether a parameter file's node name, with ``*`` for one token and ``**`` for any, means this node."""
     expression = "".join(
-        {"**": "(/[^/]+)*", "*": "/[^/]+"}.get(token, "/" + re.escape(token))
-        for token in pattern.strip("/").split("/")
+        {"**": "(/[^/]+)*", "*": "/[^/]+"}.get(token, "/" + re.escape(token)) for token in pattern.strip("/").split("/")
     )
     return re.fullmatch(expression, node) is not None
 

@@ -3,15 +3,16 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from formation_gnc.common import CommonParameters, Orbit
 from formation_gnc.control.controller import Vehicle
-from formation_gnc.interface import NANOSECONDS, NO_ECLIPSE, NOBODY, Matrix, NavigationState, Target, Vector
-from formation_gnc.mission import Mission, Orbit
+from formation_gnc.records import NO_ECLIPSE, NOBODY, NavigationState, Target
+from formation_gnc.types import NANOSECONDS, Matrix, Vector
 
 
 @pytest.fixture(scope="session")
-def mission() -> Mission:
+def common() -> CommonParameters:
     """MUSTANG's orbit (Roberts), 10 s ticks."""
-    return Mission(Orbit(6978100.0, inclination=1.4835298641951802), tick=10.0)
+    return CommonParameters(Orbit(6978100.0, inclination=1.4835298641951802), tick=10.0)
 
 
 @pytest.fixture(scope="session")
@@ -24,9 +25,7 @@ def vehicle() -> Vehicle:
 def estimate() -> Callable[..., NavigationState]:
     """What an estimate says of a relative state at a time (s)."""
 
-    def build(
-        state: Vector, time: float = 0.0, mass: float = 100.0, chief: Vector | None = None
-    ) -> NavigationState:
+    def build(state: Vector, time: float = 0.0, mass: float = 100.0, chief: Vector | None = None) -> NavigationState:
         return NavigationState(
             time=round(time * NANOSECONDS),
             relative_state=np.asarray(state, dtype=float),

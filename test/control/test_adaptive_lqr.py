@@ -8,18 +8,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import solve_continuous_are
 
+from formation_gnc.common import CommonParameters, Orbit
 from formation_gnc.control.adaptive_lqr import (
     FARTHEST,
     LARGEST_WEIGHT,
     AdaptiveLinearQuadraticRegulator,
     AdaptiveLqrParameters,
 )
-from formation_gnc.control.autopilot import Autopilot, ControllerParameters
 from formation_gnc.control.controller import Handover
+from formation_gnc.control.controller_manager import ControllerManager, ControllerParameters
 from formation_gnc.control.lqr import LinearQuadraticRegulator, LqrParameters
 from formation_gnc.control.networks import FORCED, Networks, Regulator, functions
 from formation_gnc.errors import DesignError
-from formation_gnc.mission import Mission, Orbit
 from formation_gnc.parameters import load
 from formation_gnc.relative.chief import KeplerChief
 from formation_gnc.relative.hill import HillModel
@@ -29,9 +29,9 @@ ROBERTS = {"position_error": (10.0,) * 3, "velocity_error": (0.1,) * 3, "thrust"
 
 
 @pytest.fixture(scope="module")
-def law(mission, vehicle):
+def law(common, vehicle):
     return lambda **changes: AdaptiveLinearQuadraticRegulator(
-        AdaptiveLqrParameters(**(ROBERTS | changes)), mission, vehicle
+        AdaptiveLqrParameters(**(ROBERTS | changes)), common, vehicle
     )
 
 
@@ -51,9 +51,9 @@ def double_integrator():
     return Regulator(dynamics, np.eye(6), np.eye(3), cost_to_go)
 
 
-def test_the_law_starts_as_lqr(law, mission, vehicle, estimate, target):
+def test_the_law_starts_as_lqr(law, common, vehicle, estimate, target):
     state = np.array([10.0, -20.0, 5.0, 0.01, 0.0, -0.02])
-    plain = LinearQuadraticRegulator(LqrParameters(gain="continuous", **ROBERTS), mission, vehicle)
+    plain = LinearQuadraticRegulator(LqrParameters(gain="continuous", **ROBERTS), common, vehicle)
     force = law().command(estimate(state), target()).force
     gain = np.array(law().figures()["gain at the start [N/m, N/(m/s)]"])
     np.testing.assert_allclose(-gain @ state, force, rtol=1e-9)
@@ -106,12 +106,10 @@ def test_slopes_are_the_derivatives_of_the_functions():
         np.testing.assert_allclose(slopes[:, column], (ends[0] - ends[1]) / 2e-5, atol=1e-8)
 
 
-def test_under_a_constant_disturbance_it_settles_near_where_the_optimum_does(
-    law, mission, vehicle, estimate, target
-):
+def test_under_a_constant_disturbance_it_settles_near_where_the_optimum_does(law, common, vehicle, estimate, target):
     """u = -K x - R^-1 B' w with w = -(A - B K)^-T P B d, and x' = 0."""
-    model, push, flying = HillModel(mission.mean_motion), np.array([2e-6, -1e-6, 1e-6]), law()
-    plain = LinearQuadraticRegulator(LqrParameters(**ROBERTS), mission, vehicle)
+    model, push, flying = HillModel(common.mean_motion), np.array([2e-6, -1e-6, 1e-6]), law()
+    plain = LinearQuadraticRegulator(LqrParameters(**ROBERTS), common, vehicle)
     left, _ = fly(plain, model, estimate, target, np.zeros(6), 800, push)
     learnt, _ = fly(flying, model, estimate, target, np.zeros(6), 800, push)
     a, b, p = model.dynamics(0.0), model.INPUT, flying.cost_to_go
@@ -126,7 +124,7 @@ def test_under_a_constant_disturbance_it_settles_near_where_the_optimum_does(
 
 def test_about_a_chief_on_another_orbit_than_believed_the_error_is_smaller(vehicle, estimate, target):
     """Baseline: circular, 10 % low. Truth: e = 0.3; the target is a place that no free orbit keeps."""
-    believed = Mission(Orbit(9e6), tick=10.0)
+    believed = CommonParameters(Orbit(9e6), tick=10.0)
     model = NonlinearModel(KeplerChief(1e7, 0.3))
     away = np.array([0.0, -100.0, 0.0, 0.0, 0.0, 0.0])
     errors = []
@@ -142,13 +140,13 @@ def test_about_a_chief_on_another_orbit_than_believed_the_error_is_smaller(vehic
 @pytest.mark.parametrize("network", ["model_weights", "costate_weights"])
 @pytest.mark.parametrize("weight", [2.0 * LARGEST_WEIGHT, -2.0 * LARGEST_WEIGHT, np.inf, np.nan])
 def test_weights_that_blow_up_are_named_and_lqr_flies_from_then_on(
-    network, weight, law, mission, vehicle, estimate, target
+    network, weight, law, common, vehicle, estimate, target
 ):
     flying, state = law(), np.array([10.0, -20.0, 5.0, 0.01, 0.0, -0.02])
     flying.command(estimate(state), target())
     weights = getattr(flying.networks, network)
     weights[0, 0] = weight
-    plain = LinearQuadraticRegulator(LqrParameters(gain="continuous", **ROBERTS), mission, vehicle)
+    plain = LinearQuadraticRegulator(LqrParameters(gain="continuous", **ROBERTS), common, vehicle)
     for tick in (1, 2):
         with np.errstate(all="ignore"):
             command = flying.command(estimate(state, 10.0 * tick), target(time=10.0 * tick))
@@ -156,16 +154,16 @@ def test_weights_that_blow_up_are_named_and_lqr_flies_from_then_on(
         assert command.fallback.endswith("LQR flies")
         np.testing.assert_allclose(command.force, plain.command(estimate(state), target()).force, rtol=1e-9)
     new = law()
-    new.take_over(Handover(np.zeros(3), "adaptive_lqr", flying))
+    new.activate(Handover(np.zeros(3), "adaptive_lqr", flying))
     assert not new.command(estimate(state), target()).fallback
 
 
-def test_an_estimate_out_of_any_range_undoes_nothing(law, mission, vehicle, estimate, target):
+def test_an_estimate_out_of_any_range_undoes_nothing(law, common, vehicle, estimate, target):
     flying, push = law(), np.array([2e-6, -1e-6, 1e-6])
-    state = fly(flying, HillModel(mission.mean_motion), estimate, target, np.zeros(6), 300, push)[0][-1]
+    state = fly(flying, HillModel(common.mean_motion), estimate, target, np.zeros(6), 300, push)[0][-1]
     known = flying.networks.model_weights
     far = np.full(6, 10.0 * FARTHEST)
-    plain = LinearQuadraticRegulator(LqrParameters(gain="continuous", **ROBERTS), mission, vehicle)
+    plain = LinearQuadraticRegulator(LqrParameters(gain="continuous", **ROBERTS), common, vehicle)
     command = flying.command(estimate(far, 3000.0), target(time=3000.0))
     assert command.fallback == "adaptive_lqr: the error is out of any range; LQR flies"
     np.testing.assert_allclose(command.force, plain.command(estimate(far), target()).force, rtol=1e-9)
@@ -178,18 +176,18 @@ def test_an_estimate_out_of_any_range_undoes_nothing(law, mission, vehicle, esti
     assert np.linalg.norm(command.force - plain_force) > 1e-5  # what it knew is flown
 
 
-def test_new_parameters_keep_what_was_learnt(law, mission, estimate, target):
+def test_new_parameters_keep_what_was_learnt(law, common, estimate, target):
     flying, push = law(), np.array([2e-6, -1e-6, 1e-6])
-    fly(flying, HillModel(mission.mean_motion), estimate, target, np.zeros(6), 300, push)
+    fly(flying, HillModel(common.mean_motion), estimate, target, np.zeros(6), 300, push)
     new, other = law(inertia=0.2), law(reach=50.0)
     for each in (new, other):
-        each.take_over(Handover(np.zeros(3), "adaptive_lqr", flying))
+        each.activate(Handover(np.zeros(3), "adaptive_lqr", flying))
     np.testing.assert_array_equal(new.networks.model_weights, flying.networks.model_weights)
     assert not other.networks.model_weights.any()  # other units
 
 
-def test_a_leap_of_the_target_is_not_taken_for_an_acceleration(law, mission, estimate, target):
-    model, flying = HillModel(mission.mean_motion), law(reach=1000.0)
+def test_a_leap_of_the_target_is_not_taken_for_an_acceleration(law, common, estimate, target):
+    model, flying = HillModel(common.mean_motion), law(reach=1000.0)
     fly(flying, model, estimate, target, np.zeros(6), 50)
     assert np.abs(flying.networks.model_weights).max() < 1e-9
     leap = target(np.array([0.0, 50.0, 0.0, 0.0, 0.2, 0.0]), time=500.0)
@@ -197,7 +195,7 @@ def test_a_leap_of_the_target_is_not_taken_for_an_acceleration(law, mission, est
     assert np.abs(flying.networks.model_weights).max() < 1e-9
 
 
-def test_learning_too_brisk_for_the_tick_is_refused(law, mission, vehicle):
+def test_learning_too_brisk_for_the_tick_is_rejected(law, common, vehicle):
     with pytest.raises(DesignError, match="at least 5 ticks"):
         law(identification_time=40.0)
     with pytest.raises(DesignError, match="adaptive_lqr: state_weight has 2 values"):
@@ -213,12 +211,10 @@ numbers = st.floats(-1e200, 1e200)
     inertia=st.floats(0.0, 10.0),
     reach=st.floats(1e-3, 1e6),
 )
-def test_whatever_comes_in_a_finite_force_within_the_limit_comes_out(
-    states, inertia, reach, estimate, target
-):
+def test_whatever_comes_in_a_finite_force_within_the_limit_comes_out(states, inertia, reach, estimate, target):
     values = {"chief.semi_major_axis": 7.5e6, "tick": 10.0, "algorithm": "adaptive_lqr"}
     values |= {"adaptive_lqr.inertia": inertia, "adaptive_lqr.reach": reach}
-    pilot = Autopilot("controller", load(ControllerParameters, values))
+    pilot = ControllerManager("controller", load(ControllerParameters, values))
     for tick in range(4):
         seen, aim = estimate(states[tick], 10.0 * tick), target(states[tick // 2], 10.0 * tick)
         thrust, status = pilot.on_tick(dataclasses.replace(seen), aim)

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from formation_gnc.control.autopilot import Autopilot, ControllerParameters
+from formation_gnc.control.controller_manager import ControllerManager, ControllerParameters
 from formation_gnc.control.registry import ALGORITHMS, FINITE_HORIZONS
-from formation_gnc.interface import NANOSECONDS
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.parameters import load
+from formation_gnc.types import NANOSECONDS
 
 CHIEF = state_from_elements(Elements(6978100.0, 0.0, 1.48, 0.0, 0.0, 0.0))
 LIMIT = np.array([0.01, 0.02, 0.0])
@@ -21,12 +21,12 @@ STRONG = np.full(3, 50.0)
 """N: plans to go some kilometres in 300 s ask less."""
 
 
-def autopilot(algorithm: str, **values: Any) -> Autopilot:
+def autopilot(algorithm: str, **values: Any) -> ControllerManager:
     basis = {"chief.semi_major_axis": 6978100.0, "tick": 10.0, "thrust_limit": tuple(LIMIT)}
     own = {key.replace("__", "."): value for key, value in values.items()}
     if algorithm in FINITE_HORIZONS:
         own[f"{algorithm}.final_time"] = 300.0  # short plans are soon made
-    return Autopilot("controller", load(ControllerParameters, {"algorithm": algorithm} | basis | own))
+    return ControllerManager("controller", load(ControllerParameters, {"algorithm": algorithm} | basis | own))
 
 
 def arrays(shape: Any, size: float) -> st.SearchStrategy[Any]:
@@ -118,6 +118,6 @@ def test_with_a_mass_that_none_has_nothing_is_thrust_and_the_law_flies_on(algori
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
-def test_no_thrust_limit_at_all_is_refused(algorithm):
+def test_no_thrust_limit_at_all_is_rejected(algorithm):
     with pytest.raises(ValueError, match=r"thrust_limit: .* is not allowed; one axis must push"):
         autopilot(algorithm, thrust_limit=(0.0, 0.0, 0.0))

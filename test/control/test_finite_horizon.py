@@ -20,10 +20,10 @@ from formation_gnc.control.finite_horizon import (
 from formation_gnc.control.registry import ALGORITHMS
 from formation_gnc.errors import DesignError
 from formation_gnc.guidance.relative_orbit import RelativeOrbit, RelativeOrbitParameters
-from formation_gnc.interface import NANOSECONDS
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.relative.chief import KeplerChief
 from formation_gnc.relative.nonlinear import NonlinearModel
+from formation_gnc.types import NANOSECONDS
 
 CHIEF = state_from_elements(Elements(6978100.0, 0.0, 1.48, 0.0, 0.0, 0.0))
 FINITE_HORIZONS = [law for law in ALGORITHMS.values() if issubclass(law, FiniteHorizonController)]
@@ -33,8 +33,8 @@ PARAMETERS = FiniteHorizonParameters(final_time=1000.0, step=50.0, replan_interv
 class Told(FiniteHorizonController):
     """Plans half the thrust limit along x, or what it is told."""
 
-    def __init__(self, mission, vehicle, answer=None, **changes):
-        super().__init__(dataclasses.replace(PARAMETERS, **changes), mission, vehicle)
+    def __init__(self, common, vehicle, answer=None, **changes):
+        super().__init__(dataclasses.replace(PARAMETERS, **changes), common, vehicle)
         self.answer, self.tasks = answer, []
 
     def plan(self, task: Task) -> Plan:
@@ -56,8 +56,8 @@ def fly(law, estimate, target, ticks, begin=0, tick=10.0, goal=lambda time: np.z
     ]
 
 
-def test_it_plans_on_schedule_until_the_last_plan_and_then_holds(mission, vehicle, estimate, target):
-    law = Told(mission, vehicle)
+def test_it_plans_on_schedule_until_the_last_plan_and_then_holds(common, vehicle, estimate, target):
+    law = Told(common, vehicle)
     commands = fly(law, estimate, target, 110)
     planned = [index for index, command in enumerate(commands) if command.solver == "planned"]
     assert planned == [0, 20, 40, 60]  # at 800 s, 200 s are to go: less than last_plan
@@ -71,8 +71,8 @@ def test_it_plans_on_schedule_until_the_last_plan_and_then_holds(mission, vehicl
     np.testing.assert_array_equal(commands[105].force, held.force)
 
 
-def test_what_is_left_of_a_plan_is_the_guess_for_the_next(mission, vehicle, estimate, target):
-    law = Told(mission, vehicle)
+def test_what_is_left_of_a_plan_is_the_guess_for_the_next(common, vehicle, estimate, target):
+    law = Told(common, vehicle)
     fly(law, estimate, target, 21)
     assert law.tasks[0].guess is None
     np.testing.assert_allclose(law.tasks[1].guess, [[5e-5, 0, 0]] * 16, atol=1e-18)
@@ -87,10 +87,8 @@ def test_what_is_left_of_a_plan_is_the_guess_for_the_next(mission, vehicle, esti
         (ZeroDivisionError("by zero"), "by zero"),
     ],
 )
-def test_a_plan_that_does_not_count_is_named_and_another_law_flies(
-    answer, words, mission, vehicle, estimate, target
-):
-    law = Told(mission, vehicle, answer)
+def test_a_plan_that_does_not_count_is_named_and_another_law_flies(answer, words, common, vehicle, estimate, target):
+    law = Told(common, vehicle, answer)
     (command,) = fly(law, estimate, target, 1)
     assert words in command.fallback
     assert command.fallback.endswith("LQR flies")
@@ -109,26 +107,24 @@ def test_a_plan_that_does_not_count_is_named_and_another_law_flies(
 
 @pytest.mark.parametrize("before", FINITE_HORIZONS)
 @pytest.mark.parametrize("after", FINITE_HORIZONS)
-def test_a_swap_begins_a_reconfiguration_and_new_parameters_go_on(
-    before, after, mission, vehicle, estimate, target
-):
-    old, new = (law(law.Parameters(final_time=500.0, step=50.0), mission, vehicle) for law in (before, after))
+def test_a_swap_begins_a_reconfiguration_and_new_parameters_go_on(before, after, common, vehicle, estimate, target):
+    old, new = (law(law.Parameters(final_time=500.0, step=50.0), common, vehicle) for law in (before, after))
     seen = estimate([1.0, 0, 0, 0, 0, 0], chief=CHIEF)
     assert old.command(seen, target()).solver == "planned"
-    new.take_over(Handover(np.zeros(3), "before", old))
+    new.activate(Handover(np.zeros(3), "before", old))
     later = dataclasses.replace(seen, time=10 * NANOSECONDS)
     assert new.command(later, target(time=10.0)).solver == ("following" if before is after else "planned")
 
 
-def test_a_chief_on_no_orbit_is_named(mission, vehicle, estimate, target):
-    command = Told(mission, vehicle).command(estimate(np.ones(6)), target())
+def test_a_chief_on_no_orbit_is_named(common, vehicle, estimate, target):
+    command = Told(common, vehicle).command(estimate(np.ones(6)), target())
     assert "no plan" in command.fallback
     assert np.isfinite(command.force).all()
 
 
-def test_a_leap_of_the_target_begins_anew_and_a_smooth_path_does_not(mission, vehicle, estimate, target):
-    law = Told(mission, vehicle)
-    n = mission.mean_motion
+def test_a_leap_of_the_target_begins_anew_and_a_smooth_path_does_not(common, vehicle, estimate, target):
+    law = Told(common, vehicle)
+    n = common.mean_motion
     small, large = (RelativeOrbit(RelativeOrbitParameters(rho=rho, m=1.0), n) for rho in (1000.0, 1010.0))
 
     def path(time):
@@ -152,32 +148,28 @@ def test_a_leap_of_the_target_begins_anew_and_a_smooth_path_does_not(mission, ve
 def test_free_orbits_of_any_size_do_not_leap_and_steps_between_them_do(rho, m, tick, theta, step, target):
     n = 1.1e-3
     near = RelativeOrbit(RelativeOrbitParameters(rho=rho, m=m, theta=theta), n).states(np.array([0.0, tick]))
-    far = RelativeOrbit(RelativeOrbitParameters(rho=rho, m=m, theta=theta, b=step), n).states(
-        np.array([tick])
-    )
+    far = RelativeOrbit(RelativeOrbitParameters(rho=rho, m=m, theta=theta, b=step), n).states(np.array([tick]))
     assert not leaps(target(near[0]), target(near[1], tick))
     if step > 1.0 + 0.05 * np.linalg.norm(near[1] - near[0]):
         assert leaps(target(near[0]), target(far[0], tick))
 
 
-def test_a_change_of_parameters_goes_on_and_a_final_time_that_is_past_is_named(
-    mission, vehicle, estimate, target
-):
-    law, other = Told(mission, vehicle), Told(mission, vehicle, final_time=400.0)
+def test_a_change_of_parameters_goes_on_and_a_final_time_that_is_past_is_named(common, vehicle, estimate, target):
+    law, other = Told(common, vehicle), Told(common, vehicle, final_time=400.0)
     fly(law, estimate, target, 50)
-    other.take_over(Handover(np.zeros(3), "told", law))
+    other.activate(Handover(np.zeros(3), "told", law))
     (command,) = fly(other, estimate, target, 1, 50)
     assert command.fallback == "final_time is past by 100 s; LQR flies"
-    longer = Told(mission, vehicle, final_time=2000.0)
-    longer.take_over(Handover(np.zeros(3), "told", law))
+    longer = Told(common, vehicle, final_time=2000.0)
+    longer.activate(Handover(np.zeros(3), "told", law))
     fly(longer, estimate, target, 20, 51)
     assert longer.tasks[0].duration == pytest.approx(1400.0)  # counted from the begin
 
 
-def test_the_goal_is_the_preview_and_free_flight_from_its_end(mission, target):
+def test_the_goal_is_the_preview_and_free_flight_from_its_end(common, target):
     """On an orbit so small that Hill's equations are the exact ones."""
-    orbit = RelativeOrbit(RelativeOrbitParameters(rho=1.0, m=1.0), mission.mean_motion)
-    model = NonlinearModel(KeplerChief(mission.chief.semi_major_axis))
+    orbit = RelativeOrbit(RelativeOrbitParameters(rho=1.0, m=1.0), common.mean_motion)
+    model = NonlinearModel(KeplerChief(common.chief.semi_major_axis))
     times = 60.0 * np.arange(11)
     states = orbit.states(times)
     aim = target(states[0], preview=states[1:], step=60.0)
@@ -206,14 +198,14 @@ def test_the_mean_of_a_plan_keeps_its_impulse_however_it_is_cut(forces, cuts):
     np.testing.assert_allclose(impulse.sum(axis=0), total, atol=1e-4)
 
 
-def test_a_plan_of_too_many_steps_is_refused(mission, vehicle):
+def test_a_plan_of_too_many_steps_is_rejected(common, vehicle):
     with pytest.raises(DesignError, match=f"at most {MOST_STEPS} steps"):
-        Told(mission, vehicle, step=0.1)
+        Told(common, vehicle, step=0.1)
 
 
-def test_an_axis_without_thrust_is_no_obstacle_unless_the_plan_uses_it(mission, estimate, target):
+def test_an_axis_without_thrust_is_no_obstacle_unless_the_plan_uses_it(common, estimate, target):
     vehicle = Vehicle(100.0, np.array([0.01, 0.0, 0.01]))
-    (command,) = fly(Told(mission, vehicle), estimate, target, 1)
+    (command,) = fly(Told(common, vehicle), estimate, target, 1)
     assert command.solver == "planned"
-    (command,) = fly(Told(mission, vehicle, np.array([0.0, 1e-5, 0.0])), estimate, target, 1)
+    (command,) = fly(Told(common, vehicle, np.array([0.0, 1e-5, 0.0])), estimate, target, 1)
     assert "too short" in command.fallback

@@ -5,16 +5,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from formation_gnc.common import CommonParameters, Orbit
 from formation_gnc.control.controller import Handover, Vehicle
 from formation_gnc.control.hinf import HInfinityController, HinfParameters
 from formation_gnc.control.mixed_sensitivity import Weight
 from formation_gnc.errors import DesignError
-from formation_gnc.mission import Mission, Orbit
 from formation_gnc.orbit.constants import MU
 from formation_gnc.relative.hill import HillModel
 
 MINUTE = 60.0
-GEO = Mission(Orbit((MU / 7.2921e-5**2) ** (1.0 / 3.0)), tick=0.1 * MINUTE)
+GEO = CommonParameters(Orbit((MU / 7.2921e-5**2) ** (1.0 / 3.0)), tick=0.1 * MINUTE)
 MASS = 1000.0  # Neokleous prints none
 
 
@@ -83,17 +83,13 @@ def test_the_best_gamma_is_that_of_python_control():
 
 
 def test_full_information_keeps_its_gamma_against_an_acceleration():
-    law = HInfinityController(
-        neokleous(shift=0.0, disturbance=1e-5, form="full_information"), GEO, vehicle(1.0)
-    )
+    law = HInfinityController(neokleous(shift=0.0, disturbance=1e-5, form="full_information"), GEO, vehicle(1.0))
     b = np.vstack([np.zeros((3, 3)), np.eye(3)])
     loop, problem = law.continuous.closed_loop(law.problem.dynamics, b), law.problem
     answer = np.hstack([law.continuous.d, law.continuous.c])
     worst = 0.0
     for w in np.logspace(-7, 1, 300):
-        state = np.linalg.solve(
-            1j * w * np.eye(12) - loop, np.vstack([b, np.zeros((6, 3))]) * problem.disturbance
-        )
+        state = np.linalg.solve(1j * w * np.eye(12) - loop, np.vstack([b, np.zeros((6, 3))]) * problem.disturbance)
         performance, uncertainty = problem.performance, problem.uncertainty
         position = state[:3]
         stacked = np.vstack(
@@ -136,7 +132,7 @@ def fresh(form, limit=1.0):
 def test_taking_over_begins_with_the_force_that_flew(form, position, velocity, force, estimate, target):
     law = LAWS[form]
     law._states = None
-    law.take_over(Handover(np.array(force), "lqr"))
+    law.activate(Handover(np.array(force), "lqr"))
     command = law.command(estimate([*position, *velocity], mass=MASS), target())
     # Rounding of a sum whose terms may be 1e4 times larger.
     np.testing.assert_allclose(command.force, force, rtol=0.0, atol=1e-9)
@@ -187,6 +183,6 @@ def test_the_same_parameters_give_the_same_law():
         ({"bandwidth": (0.5, 0.5, 0.5), "thrust": (1e5, 1e5, 1e5)}, "once a tick is not stable"),
     ],
 )
-def test_inadmissible_parameters_are_refused_with_the_reason(changes, message):
+def test_inadmissible_parameters_are_rejected_with_the_reason(changes, message):
     with pytest.raises(DesignError, match=message):
         HInfinityController(dataclasses.replace(neokleous(), **changes), GEO, vehicle(1.0))

@@ -3,10 +3,10 @@ import dataclasses
 import numpy as np
 import pytest
 
+from formation_gnc.common import CommonParameters, Orbit
 from formation_gnc.control.controller import Handover
 from formation_gnc.control.lqr import LinearQuadraticRegulator, LqrParameters
 from formation_gnc.errors import DesignError
-from formation_gnc.mission import Mission, Orbit
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
 from formation_gnc.orbit.propagation import advance_with_transition
@@ -33,28 +33,26 @@ def fly(law, model, estimate, target, start, ticks, tick=10.0, limit=0.01, distu
 
 @pytest.mark.parametrize("gain", ["discrete", "continuous"])
 @pytest.mark.parametrize("model", ["hill", "schweighart_sedwick"])
-def test_an_offset_is_recovered_within_about_half_an_orbit(gain, model, mission, vehicle, estimate, target):
-    law = LinearQuadraticRegulator(dataclasses.replace(ROBERTS, gain=gain, model=model), mission, vehicle)
-    states, forces = fly(law, HillModel(mission.mean_motion), estimate, target, [10, 10, 10, 0, 0, 0], 400)
+def test_an_offset_is_recovered_within_about_half_an_orbit(gain, model, common, vehicle, estimate, target):
+    law = LinearQuadraticRegulator(dataclasses.replace(ROBERTS, gain=gain, model=model), common, vehicle)
+    states, forces = fly(law, HillModel(common.mean_motion), estimate, target, [10, 10, 10, 0, 0, 0], 400)
     assert np.abs(forces).max() < 0.01  # Roberts' design point keeps within the thrusters
     assert np.linalg.norm(states[290, :3]) < 1.73  # half an orbit is 290 ticks: a tenth is left
 
 
 @pytest.mark.parametrize("gain", ["frozen", "periodic"])
 def test_gains_along_an_eccentric_orbit_stabilise_it(gain, vehicle, estimate, target):
-    mission = Mission(Orbit(1.2e7, eccentricity=0.4), tick=10.0)
-    law = LinearQuadraticRegulator(
-        dataclasses.replace(ROBERTS, model="tschauner_hempel", gain=gain), mission, vehicle
-    )
+    common = CommonParameters(Orbit(1.2e7, eccentricity=0.4), tick=10.0)
+    law = LinearQuadraticRegulator(dataclasses.replace(ROBERTS, model="tschauner_hempel", gain=gain), common, vehicle)
     model = TschaunerHempelModel(KeplerChief(1.2e7, 0.4))
     states, _ = fly(law, model, estimate, target, [10, 10, 10, 0, 0, 0], 1500)
     assert np.linalg.norm(states[-1, :3]) < 0.01
 
 
 def test_the_periodic_gain_has_no_jump_where_the_orbit_closes(vehicle):
-    mission = Mission(Orbit(1.2e7, eccentricity=0.4), tick=10.0)
+    common = CommonParameters(Orbit(1.2e7, eccentricity=0.4), tick=10.0)
     law = LinearQuadraticRegulator(
-        dataclasses.replace(ROBERTS, model="tschauner_hempel", gain="periodic"), mission, vehicle
+        dataclasses.replace(ROBERTS, model="tschauner_hempel", gain="periodic"), common, vehicle
     )
     period = KeplerChief(1.2e7, 0.4).period * 1e9
     size = np.abs(law.gains).max(axis=0)
@@ -63,50 +61,46 @@ def test_the_periodic_gain_has_no_jump_where_the_orbit_closes(vehicle):
     np.testing.assert_allclose(at, later, rtol=0.0, atol=1e-9 * size.max())
 
 
-def test_the_finite_gain_arrives_on_time_and_then_holds(mission, vehicle, estimate, target):
+def test_the_finite_gain_arrives_on_time_and_then_holds(common, vehicle, estimate, target):
     parameters = dataclasses.replace(ROBERTS, gain="finite", final_time=2000.0, terminal_weight=1e6)
-    law = LinearQuadraticRegulator(parameters, mission, vehicle)
-    states, _ = fly(law, HillModel(mission.mean_motion), estimate, target, [10, 10, 10, 0, 0, 0], 400)
-    infinite = LinearQuadraticRegulator(ROBERTS, mission, vehicle)
-    others, _ = fly(infinite, HillModel(mission.mean_motion), estimate, target, [10, 10, 10, 0, 0, 0], 400)
+    law = LinearQuadraticRegulator(parameters, common, vehicle)
+    states, _ = fly(law, HillModel(common.mean_motion), estimate, target, [10, 10, 10, 0, 0, 0], 400)
+    infinite = LinearQuadraticRegulator(ROBERTS, common, vehicle)
+    others, _ = fly(infinite, HillModel(common.mean_motion), estimate, target, [10, 10, 10, 0, 0, 0], 400)
     assert np.linalg.norm(states[200, :3]) < 0.01
     assert np.linalg.norm(others[200, :3]) > 0.5
     assert np.linalg.norm(states[200:, :3], axis=1).max() < 0.02
 
 
-def test_the_integral_removes_what_a_constant_disturbance_leaves(mission, vehicle, estimate, target):
-    model, push = HillModel(mission.mean_motion), np.array([2e-6, -1e-6, 1e-6])
-    plain = LinearQuadraticRegulator(ROBERTS, mission, vehicle)
-    integral = LinearQuadraticRegulator(
-        dataclasses.replace(ROBERTS, integral_error=20_000.0), mission, vehicle
-    )
+def test_the_integral_removes_what_a_constant_disturbance_leaves(common, vehicle, estimate, target):
+    model, push = HillModel(common.mean_motion), np.array([2e-6, -1e-6, 1e-6])
+    plain = LinearQuadraticRegulator(ROBERTS, common, vehicle)
+    integral = LinearQuadraticRegulator(dataclasses.replace(ROBERTS, integral_error=20_000.0), common, vehicle)
     left, _ = fly(plain, model, estimate, target, np.zeros(6), 2000, disturbance=push)
     gone, _ = fly(integral, model, estimate, target, np.zeros(6), 2000, disturbance=push)
     assert np.linalg.norm(left[-1, :3]) > 0.1
     assert np.linalg.norm(gone[-1, :3]) < 1e-2 * np.linalg.norm(left[-1, :3])  # and slowly falling
 
 
-def test_an_axis_at_its_limit_does_not_wind_up(mission, vehicle, estimate, target):
+def test_an_axis_at_its_limit_does_not_wind_up(common, vehicle, estimate, target):
     parameters = dataclasses.replace(ROBERTS, integral_error=2_000.0)
-    law = LinearQuadraticRegulator(parameters, mission, vehicle)
+    law = LinearQuadraticRegulator(parameters, common, vehicle)
     start = [0, 0, 200, 0, 0, 0]  # far beyond what 10 mN can answer in proportion
-    states, forces = fly(law, HillModel(mission.mean_motion), estimate, target, start, 3000)
+    states, forces = fly(law, HillModel(common.mean_motion), estimate, target, start, 3000)
     assert (np.abs(forces[:50, 2]) == 0.01).all()
     assert np.abs(states[-1, :3]).max() < 0.1
     unlimited = dataclasses.replace(vehicle, thrust_limit=np.full(3, np.inf))  # so it integrates throughout
-    wound = LinearQuadraticRegulator(parameters, mission, unlimited)
-    others, _ = fly(wound, HillModel(mission.mean_motion), estimate, target, start, 3000)
+    wound = LinearQuadraticRegulator(parameters, common, unlimited)
+    others, _ = fly(wound, HillModel(common.mean_motion), estimate, target, start, 3000)
     assert np.sum(np.abs(states[:, 2])) < 0.8 * np.sum(np.abs(others[:, 2]))
 
 
-def test_new_parameters_keep_the_integral(mission, vehicle, estimate, target):
+def test_new_parameters_keep_the_integral(common, vehicle, estimate, target):
     parameters = dataclasses.replace(ROBERTS, integral_error=20_000.0)
-    law, push = LinearQuadraticRegulator(parameters, mission, vehicle), np.array([2e-6, 0.0, 0.0])
-    states, forces = fly(
-        law, HillModel(mission.mean_motion), estimate, target, np.zeros(6), 1500, disturbance=push
-    )
-    same = LinearQuadraticRegulator(parameters, mission, vehicle)
-    same.take_over(Handover(forces[-1], "lqr", law))
+    law, push = LinearQuadraticRegulator(parameters, common, vehicle), np.array([2e-6, 0.0, 0.0])
+    states, forces = fly(law, HillModel(common.mean_motion), estimate, target, np.zeros(6), 1500, disturbance=push)
+    same = LinearQuadraticRegulator(parameters, common, vehicle)
+    same.activate(Handover(forces[-1], "lqr", law))
     np.testing.assert_allclose(
         same.command(estimate(states[-1]), target()).force,
         law.command(estimate(states[-1]), target()).force,
@@ -124,13 +118,13 @@ def forced_circle(time, target, rate=0.003):
     return target(state(time), time, np.array([state(time + 20.0)]), 20.0)
 
 
-def test_feed_forward_flies_a_target_that_needs_thrust(mission, vehicle, estimate, target):
+def test_feed_forward_flies_a_target_that_needs_thrust(common, vehicle, estimate, target):
     errors = {}
     for kind in ("none", "linear"):
-        law = LinearQuadraticRegulator(dataclasses.replace(ROBERTS, feed_forward=kind), mission, vehicle)
+        law = LinearQuadraticRegulator(dataclasses.replace(ROBERTS, feed_forward=kind), common, vehicle)
         start = forced_circle(0.0, target).relative_state
         states, _ = fly(
-            law, HillModel(mission.mean_motion), estimate, target, start, 600,
+            law, HillModel(common.mean_motion), estimate, target, start, 600,
             limit=1.0, reference=lambda time: forced_circle(time, target),
         )  # fmt: skip
         goal = np.array([forced_circle(10.0 * index, target).relative_state for index in range(601)])
@@ -140,9 +134,9 @@ def test_feed_forward_flies_a_target_that_needs_thrust(mission, vehicle, estimat
     assert errors["linear"] < 0.05 * errors["none"]
 
 
-def test_nonlinear_feed_forward_knows_j2_and_the_curvature(mission, vehicle, estimate, target):
-    chief = state_from_elements(Elements(**vars(mission.chief)))
-    rate = mission.mean_motion
+def test_nonlinear_feed_forward_knows_j2_and_the_curvature(common, vehicle, estimate, target):
+    chief = state_from_elements(Elements(**vars(common.chief)))
+    rate = common.mean_motion
 
     def goal(time):
         sine, cosine = 5000.0 * np.sin(rate * time), 5000.0 * np.cos(rate * time)
@@ -150,16 +144,14 @@ def test_nonlinear_feed_forward_knows_j2_and_the_curvature(mission, vehicle, est
 
     errors = {}
     for kind in ("linear", "nonlinear"):
-        law = LinearQuadraticRegulator(dataclasses.replace(ROBERTS, feed_forward=kind), mission, vehicle)
+        law = LinearQuadraticRegulator(dataclasses.replace(ROBERTS, feed_forward=kind), common, vehicle)
         leader, state, worst = chief, goal(0.0), 0.0
         for index in range(600):
             time = 10.0 * index
             aim = target(goal(time), time, goal(time + 20.0)[None], 20.0)
             acceleration = law.command(estimate(state, time, chief=leader), aim).force / 100.0
             follower = inertial_from_relative(leader, state)
-            axes = np.array(
-                [leader[:3] / np.linalg.norm(leader[:3]), np.zeros(3), np.cross(leader[:3], leader[3:])]
-            )
+            axes = np.array([leader[:3] / np.linalg.norm(leader[:3]), np.zeros(3), np.cross(leader[:3], leader[3:])])
             axes[2] /= np.linalg.norm(axes[2])
             axes[1] = np.cross(axes[2], axes[0])
             follower = advance_with_transition(follower, acceleration @ axes, 10.0, 1)[0]
@@ -171,19 +163,17 @@ def test_nonlinear_feed_forward_knows_j2_and_the_curvature(mission, vehicle, est
     assert errors["nonlinear"] < 0.1 * errors["linear"]
 
 
-def test_feed_forward_without_a_preview_says_so(mission, vehicle, estimate, target):
-    law = LinearQuadraticRegulator(dataclasses.replace(ROBERTS, feed_forward="linear"), mission, vehicle)
+def test_feed_forward_without_a_preview_says_so(common, vehicle, estimate, target):
+    law = LinearQuadraticRegulator(dataclasses.replace(ROBERTS, feed_forward="linear"), common, vehicle)
     assert "no preview" in law.command(estimate(np.zeros(6)), target()).fallback
 
 
-def test_matrices_in_place_of_bryson_weights(mission, vehicle):
-    bryson = LinearQuadraticRegulator(ROBERTS, mission, vehicle)
+def test_matrices_in_place_of_bryson_weights(common, vehicle):
+    bryson = LinearQuadraticRegulator(ROBERTS, common, vehicle)
     q = np.diag([0.01] * 3 + [100.0] * 3)
-    matrices = LqrParameters(
-        state_weight=tuple(q.ravel()), thrust_weight=tuple((np.eye(3) / 0.002**2).ravel())
-    )
+    matrices = LqrParameters(state_weight=tuple(q.ravel()), thrust_weight=tuple((np.eye(3) / 0.002**2).ravel()))
     np.testing.assert_allclose(
-        LinearQuadraticRegulator(matrices, mission, vehicle).gain, bryson.gain, rtol=1e-9, atol=1e-15
+        LinearQuadraticRegulator(matrices, common, vehicle).gain, bryson.gain, rtol=1e-9, atol=1e-15
     )
 
 
@@ -198,6 +188,6 @@ def test_matrices_in_place_of_bryson_weights(mission, vehicle):
         ({"gain": "finite", "final_time": 1e9}, "final_time"),
     ],
 )
-def test_inadmissible_parameters_are_refused_with_the_reason(changes, message, mission, vehicle):
+def test_inadmissible_parameters_are_rejected_with_the_reason(changes, message, common, vehicle):
     with pytest.raises(DesignError, match=message):
-        LinearQuadraticRegulator(dataclasses.replace(ROBERTS, **changes), mission, vehicle)
+        LinearQuadraticRegulator(dataclasses.replace(ROBERTS, **changes), common, vehicle)

@@ -6,14 +6,14 @@ from hypothesis import given, settings
 from hypothesis.extra import numpy as hnp
 from scipy.optimize import lsq_linear
 
-from formation_gnc.control.autopilot import Autopilot, ControllerParameters
+from formation_gnc.common import CommonParameters, Orbit
+from formation_gnc.control.condensed_qp import facet_normals, facet_reach
 from formation_gnc.control.controller import Handover, Vehicle
+from formation_gnc.control.controller_manager import ControllerManager, ControllerParameters
 from formation_gnc.control.mpc import ModelPredictiveController, MpcParameters, longest_eclipse
-from formation_gnc.control.programme import facet_normals, facet_reach
 from formation_gnc.errors import DesignError
-from formation_gnc.interface import NO_ECLIPSE, NOBODY
-from formation_gnc.mission import Mission, Orbit
 from formation_gnc.parameters import load
+from formation_gnc.records import NO_ECLIPSE, NOBODY
 from formation_gnc.relative.chief import KeplerChief
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.tschauner_hempel import TschaunerHempelModel
@@ -22,8 +22,8 @@ ROBERTS = MpcParameters(position_error=(10.0,) * 3, velocity_error=(0.1,) * 3, t
 OFFSET = [10.0, 10.0, 10.0, 0.0, 0.0, 0.0]
 
 
-def make(mission, vehicle, **changes):
-    return ModelPredictiveController(dataclasses.replace(ROBERTS, **changes), mission, vehicle)
+def make(common, vehicle, **changes):
+    return ModelPredictiveController(dataclasses.replace(ROBERTS, **changes), common, vehicle)
 
 
 def fly(law, model, estimate, target, start, ticks, tick=10.0, mass=100.0, eclipse=NO_ECLIPSE):
@@ -36,33 +36,31 @@ def fly(law, model, estimate, target, start, ticks, tick=10.0, mass=100.0, eclip
     return np.array(states), np.array([command.force for command in commands]), commands
 
 
-def test_without_active_limits_it_is_the_lqr(mission, vehicle, estimate, target):
-    law = make(mission, vehicle, step=10.0)
+def test_without_active_limits_it_is_the_lqr(common, vehicle, estimate, target):
+    law = make(common, vehicle, step=10.0)
     for state in (OFFSET, [0, 5, 0, 0.01, 0, 0], [-3, 0, 8, 0, -0.01, 0.01]):
         expected = law.reserve.command(estimate(state), target()).force
         law._plan = np.empty((0, 3))
         # What the solver's accuracy leaves: 1e-4 of the thrust limit, times some tens for the flat directions
         # of the cost.
-        np.testing.assert_allclose(
-            law.command(estimate(state), target()).force, expected, rtol=0.0, atol=3e-5
-        )
+        np.testing.assert_allclose(law.command(estimate(state), target()).force, expected, rtol=0.0, atol=3e-5)
 
 
-def test_matrices_in_place_of_bryson_weights(mission, vehicle, estimate, target):
+def test_matrices_in_place_of_bryson_weights(common, vehicle, estimate, target):
     matrices = MpcParameters(
         state_weight=tuple(np.diag([0.01] * 3 + [100.0] * 3).ravel()),
         thrust_weight=tuple((np.eye(3) / 0.002**2).ravel()),
     )
     ours, theirs = (
         law.command(estimate(OFFSET), target()).force
-        for law in (make(mission, vehicle), ModelPredictiveController(matrices, mission, vehicle))
+        for law in (make(common, vehicle), ModelPredictiveController(matrices, common, vehicle))
     )
     np.testing.assert_allclose(ours, theirs, rtol=1e-6)
 
 
 @pytest.mark.parametrize("weighting", ["running", "terminal"])
-def test_the_plan_is_the_optimum_within_the_limits(weighting, mission, vehicle, estimate, target):
-    law = make(mission, vehicle, weighting=weighting, position_error=(1.0,) * 3, velocity_error=(0.01,) * 3)
+def test_the_plan_is_the_optimum_within_the_limits(weighting, common, vehicle, estimate, target):
+    law = make(common, vehicle, weighting=weighting, position_error=(1.0,) * 3, velocity_error=(0.01,) * 3)
     state = np.array([40.0, -60.0, 30.0, 0.02, 0.0, 0.01])
     law.command(estimate(state), target())
     # The same as bounded least squares, from the programme's own weights but by another method.
@@ -86,9 +84,9 @@ def test_the_plan_is_the_optimum_within_the_limits(weighting, mission, vehicle, 
     np.testing.assert_allclose(ours[:3], best[:3], atol=0.02)
 
 
-def test_an_offset_is_recovered_and_the_thrust_limit_is_used(mission, vehicle, estimate, target):
+def test_an_offset_is_recovered_and_the_thrust_limit_is_used(common, vehicle, estimate, target):
     states, forces, _ = fly(
-        make(mission, vehicle), HillModel(mission.mean_motion), estimate, target, [60, 60, 60, 0, 0, 0], 900
+        make(common, vehicle), HillModel(common.mean_motion), estimate, target, [60, 60, 60, 0, 0, 0], 900
     )
     assert np.abs(forces).max() == pytest.approx(0.01, rel=1e-3)
     assert np.abs(forces).max() <= 0.01
@@ -96,8 +94,8 @@ def test_an_offset_is_recovered_and_the_thrust_limit_is_used(mission, vehicle, e
 
 
 def test_an_eccentric_chief_is_followed_on_its_own_model(vehicle, estimate, target):
-    mission = Mission(Orbit(1.0e7, eccentricity=0.3), tick=20.0)
-    law = make(mission, vehicle, model="tschauner_hempel")
+    common = CommonParameters(Orbit(1.0e7, eccentricity=0.3), tick=20.0)
+    law = make(common, vehicle, model="tschauner_hempel")
     states, _, commands = fly(
         law, TschaunerHempelModel(KeplerChief(1.0e7, 0.3)), estimate, target, OFFSET, 500, tick=20.0
     )
@@ -114,9 +112,9 @@ def test_the_total_thrust_polyhedron_lies_inside_the_sphere(point):
     assert facet_reach() < 1.15  # and it wastes little
 
 
-def test_total_thrust_and_its_rate_are_kept(mission, vehicle, estimate, target):
-    law = make(mission, vehicle, total_thrust=0.01, thrust_rate=5e-5)
-    states, forces, _ = fly(law, HillModel(mission.mean_motion), estimate, target, [60, 60, 60, 0, 0, 0], 900)
+def test_total_thrust_and_its_rate_are_kept(common, vehicle, estimate, target):
+    law = make(common, vehicle, total_thrust=0.01, thrust_rate=5e-5)
+    states, forces, _ = fly(law, HillModel(common.mean_motion), estimate, target, [60, 60, 60, 0, 0, 0], 900)
     assert np.linalg.norm(forces, axis=1).max() <= 0.01 * (1.0 + 1e-12)
     assert np.linalg.norm(forces, axis=1).max() > 0.0085
     steps = np.abs(np.diff(np.vstack([np.zeros(3), forces]), axis=0))
@@ -125,14 +123,14 @@ def test_total_thrust_and_its_rate_are_kept(mission, vehicle, estimate, target):
 
 
 @pytest.mark.parametrize("replan_interval", [0.0, 1200.0])
-def test_no_thrust_in_the_eclipses_that_are_foreseen(replan_interval, mission, vehicle, estimate, target):
+def test_no_thrust_in_the_eclipses_that_are_foreseen(replan_interval, common, vehicle, estimate, target):
     # As Kremmydas has them: the last third of every orbit.
-    law = make(mission, vehicle, off_in_eclipse=True, horizon=50, replan_interval=replan_interval)
-    period = 2.0 * np.pi / mission.mean_motion
+    law = make(common, vehicle, off_in_eclipse=True, horizon=50, replan_interval=replan_interval)
+    period = 2.0 * np.pi / common.mean_motion
     windows = period * (np.arange(4)[:, None] + np.array([2.0 / 3.0, 1.0]))
     states, forces, _ = fly(
         law,
-        HillModel(mission.mean_motion),
+        HillModel(common.mean_motion),
         estimate,
         target,
         [60, 60, 60, 0, 0, 0],
@@ -147,9 +145,9 @@ def test_no_thrust_in_the_eclipses_that_are_foreseen(replan_interval, mission, v
     assert np.linalg.norm(states[-1, :3]) < 0.5
 
 
-def test_an_eclipse_is_met_as_soon_as_it_is_foreseen_and_ends_on_its_tick(mission, vehicle, estimate, target):
+def test_an_eclipse_is_met_as_soon_as_it_is_foreseen_and_ends_on_its_tick(common, vehicle, estimate, target):
     # Whatever plan flies, and LQR in its place: a plan of ten minutes made before the eclipse was known.
-    law = make(mission, vehicle, off_in_eclipse=True, horizon=50, replan_interval=3000.0)
+    law = make(common, vehicle, off_in_eclipse=True, horizon=50, replan_interval=3000.0)
     window, forces = np.array([[300.0, 600.0]]), []
     for tick in range(80):
         known = window if tick >= 20 else NO_ECLIPSE
@@ -165,9 +163,9 @@ def test_longest_eclipse_is_that_of_the_shadow_and_known_orbits():
     assert longest_eclipse(Orbit(1e7, eccentricity=0.3)) > longest_eclipse(Orbit(1e7))
 
 
-def test_one_solve_serves_the_replan_interval(mission, vehicle, estimate, target):
-    law = make(mission, vehicle, replan_interval=600.0)
-    _, forces, commands = fly(law, HillModel(mission.mean_motion), estimate, target, OFFSET, 180)
+def test_one_solve_serves_the_replan_interval(common, vehicle, estimate, target):
+    law = make(common, vehicle, replan_interval=600.0)
+    _, forces, commands = fly(law, HillModel(common.mean_motion), estimate, target, OFFSET, 180)
     assert [index for index, command in enumerate(commands) if command.iterations] == [0, 60, 120]
     held = forces.reshape(30, 6, 3)
     np.testing.assert_array_equal(held, held[:, :1].repeat(6, axis=1))
@@ -175,7 +173,7 @@ def test_one_solve_serves_the_replan_interval(mission, vehicle, estimate, target
 
 # Kremmydas' NetSat: 1.5 kg, 8 uN, 240 s, two thirds of an orbit with thrust. His axes are along, across,
 # down.
-NETSAT = Mission(Orbit(7078137.0), tick=240.0)
+NETSAT = CommonParameters(Orbit(7078137.0), tick=240.0)
 
 
 def netsat(weight):
@@ -206,9 +204,7 @@ def test_kremmydas_multistep_converges_to_a_moving_target(weight, least, most, e
     state, errors = ellipse(1000.0, 800.0, 0.0), []
     for index in range(2500):
         time = 240.0 * index
-        force = law.command(
-            estimate(state, time, 1.5), target(ellipse(1000.0, 0.0, time + 900.0), time)
-        ).force
+        force = law.command(estimate(state, time, 1.5), target(ellipse(1000.0, 0.0, time + 900.0), time)).force
         assert np.abs(force).max() <= 8e-6
         state = model.propagate(0.0, state, 240.0, force / 1.5)
         errors.append(np.linalg.norm((state - ellipse(1000.0, 0.0, time + 1140.0))[:3]))
@@ -217,22 +213,22 @@ def test_kremmydas_multistep_converges_to_a_moving_target(weight, least, most, e
     assert least < max(errors[-25:]) < most
 
 
-def test_absolute_cost_takes_less_delta_v(mission, vehicle, estimate, target):
+def test_absolute_cost_takes_less_delta_v(common, vehicle, estimate, target):
     used = {}
     for cost in ("quadratic", "absolute"):
         law = make(
-            mission, vehicle, cost=cost, weighting="terminal", horizon=60, position_error=(0.1,) * 3,
+            common, vehicle, cost=cost, weighting="terminal", horizon=60, position_error=(0.1,) * 3,
             velocity_error=(1e-4,) * 3, thrust=(0.01,) * 3, replan_interval=3600.0,
         )  # fmt: skip
-        states, forces, _ = fly(law, HillModel(mission.mean_motion), estimate, target, OFFSET, 360)
+        states, forces, _ = fly(law, HillModel(common.mean_motion), estimate, target, OFFSET, 360)
         assert np.linalg.norm(states[-1, :3]) < 0.5
         used[cost] = np.abs(forces).sum()
     assert used["absolute"] < 0.9 * used["quadratic"]
 
 
-def past(law, mission, estimate, target, others=NOBODY):
+def past(law, common, estimate, target, others=NOBODY):
     """Flight from 60 m ahead of the chief to 60 m behind, with others in free flight: states of all."""
-    model, aim = HillModel(mission.mean_motion), np.array([0.0, -60.0, 0.0, 0.0, 0.0, 0.0])
+    model, aim = HillModel(common.mean_motion), np.array([0.0, -60.0, 0.0, 0.0, 0.0, 0.0])
     state, states, theirs = np.array([0.0, 60.0, 1.0, 0.0, 0.0, 0.0]), [], []
     for index in range(600):
         time = 10.0 * index
@@ -246,37 +242,37 @@ def past(law, mission, estimate, target, others=NOBODY):
     return np.array(states), np.array(theirs)
 
 
-def test_the_keep_out_sphere_about_the_chief_is_flown_round(mission, vehicle, estimate, target):
+def test_the_keep_out_sphere_about_the_chief_is_flown_round(common, vehicle, estimate, target):
     closest = {}
     for radius, chief in ((0.0, True), (40.0, False), (40.0, True)):
-        law = make(mission, vehicle, keep_out_radius=radius, keep_out_chief=chief)
-        states, _ = past(law, mission, estimate, target)
+        law = make(common, vehicle, keep_out_radius=radius, keep_out_chief=chief)
+        states, _ = past(law, common, estimate, target)
         closest[radius, chief] = np.linalg.norm(states[:, :3], axis=1).min()
     assert closest[0.0, True] < 30.0
     assert closest[40.0, False] < 30.0
     assert closest[40.0, True] > 38.0  # it is soft
 
 
-def test_keep_out_spheres_about_others_are_flown_round_as_these_move(mission, vehicle, estimate, target):
+def test_keep_out_spheres_about_others_are_flown_round_as_these_move(common, vehicle, estimate, target):
     # Two that come to where the satellite would be, at different times, on closed orbits.
-    model, n = HillModel(mission.mean_motion), mission.mean_motion
-    alone, _ = past(make(mission, vehicle), mission, estimate, target)
+    model, n = HillModel(common.mean_motion), common.mean_motion
+    alone, _ = past(make(common, vehicle), common, estimate, target)
     others = []
     for tick, rate in ((110, 0.02), (180, -0.02)):
         x, y, z = alone[tick, :3] + [2.0, 1.0, -1.0]
         others.append(model.propagate(0.0, np.array([x, y, z, 0.0, -2.0 * n * x, rate]), -10.0 * tick))
     closest = {}
     for radius in (0.0, 20.0):
-        law = make(mission, vehicle, keep_out_radius=radius, keep_out_chief=False)
-        states, theirs = past(law, mission, estimate, target, np.array(others))
+        law = make(common, vehicle, keep_out_radius=radius, keep_out_chief=False)
+        states, theirs = past(law, common, estimate, target, np.array(others))
         apart = np.linalg.norm(states[:, None, :3] - theirs[:, :, :3], axis=2)
         closest[radius] = apart.min(axis=0)
     assert (closest[0.0] < 3.0).all()
     assert (closest[20.0] > 18.5).all()  # it is soft
 
 
-def test_a_preview_is_followed_as_far_as_it_reaches(mission, vehicle, estimate, target):
-    law, other = make(mission, vehicle), make(mission, vehicle)
+def test_a_preview_is_followed_as_far_as_it_reaches(common, vehicle, estimate, target):
+    law, other = make(common, vehicle), make(common, vehicle)
     drifting = np.tile([30.0, 0.0, 0.0, 0.0, 0.0, 0.0], (30, 1))
     with_preview = law.command(estimate(np.zeros(6)), target(np.zeros(6), preview=drifting)).force
     assert with_preview[0] > 1e-3
@@ -284,16 +280,16 @@ def test_a_preview_is_followed_as_far_as_it_reaches(mission, vehicle, estimate, 
     assert np.abs(wrong_step).max() < 1e-6
 
 
-def test_what_cannot_be_solved_flies_the_last_plan_and_then_lqr(mission, vehicle, estimate, target):
-    law = make(mission, vehicle, off_in_eclipse=True, thrust_rate=1e-6, horizon=50)
-    law.take_over(Handover(np.full(3, 0.01), "coast"))
+def test_what_cannot_be_solved_flies_the_last_plan_and_then_lqr(common, vehicle, estimate, target):
+    law = make(common, vehicle, off_in_eclipse=True, thrust_rate=1e-6, horizon=50)
+    law.activate(Handover(np.full(3, 0.01), "coast"))
     first = law.command(estimate(OFFSET), target(eclipse=np.array([[350.0, 2000.0]])))
     # 350 s are too short to bring 10 mN down to none at a micronewton per second
     assert first.fallback.startswith("mpc: primal infeasible")
     assert first.fallback.endswith("no plan, LQR flies")
     # and LQR keeps to that rate as well
     np.testing.assert_allclose(first.force, np.full(3, 0.01) - 1e-5)
-    good = make(mission, vehicle)
+    good = make(common, vehicle)
     planned = good.command(estimate(OFFSET), target())
     lost = good.command(estimate(1e200 * np.ones(6), 10.0), target(time=10.0))
     assert lost.fallback == "mpc: the error is out of any range; the last plan flies"
@@ -306,17 +302,17 @@ def test_what_cannot_be_solved_flies_the_last_plan_and_then_lqr(mission, vehicle
 @given(states=hnp.arrays(float, (4, 6), elements={"min_value": -1e12, "max_value": 1e12}))
 def test_any_sequence_of_estimates_gets_bounded_commands(states, estimate, target):
     values = {"chief.semi_major_axis": 6978100.0, "tick": 10.0, "algorithm": "mpc", "mpc.horizon": 6}
-    pilot = Autopilot("controller", load(ControllerParameters, values))
+    pilot = ControllerManager("controller", load(ControllerParameters, values))
     for tick, state in enumerate(states):
         thrust, _ = pilot.on_tick(estimate(state, 10.0 * tick), target(time=10.0 * tick))
         assert (np.abs(thrust.force) <= 0.01).all()
 
 
-def test_equal_inputs_give_equal_bits(mission, vehicle, estimate, target):
+def test_equal_inputs_give_equal_bits(common, vehicle, estimate, target):
     flights = [
         fly(
-            make(mission, vehicle),
-            HillModel(mission.mean_motion),
+            make(common, vehicle),
+            HillModel(common.mean_motion),
             estimate,
             target,
             [60, 60, 60, 0, 0, 0],
@@ -339,6 +335,6 @@ def test_equal_inputs_give_equal_bits(mission, vehicle, estimate, target):
         ),
     ],
 )
-def test_inadmissible_parameters_are_refused_with_the_reason(changes, message, mission, vehicle):
+def test_inadmissible_parameters_are_rejected_with_the_reason(changes, message, common, vehicle):
     with pytest.raises(DesignError, match=message):
-        make(mission, vehicle, **changes)
+        make(common, vehicle, **changes)

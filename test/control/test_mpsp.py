@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from formation_gnc.control.autopilot import Autopilot, ControllerParameters
+from formation_gnc.common import CommonParameters, Orbit
 from formation_gnc.control.controller import Vehicle
+from formation_gnc.control.controller_manager import ControllerManager, ControllerParameters
 from formation_gnc.control.finite_horizon import Plan, Task
+from formation_gnc.control.fixed_endpoint_lq import Cost, steer
 from formation_gnc.control.gmpsp import GmpspController
 from formation_gnc.control.mpsp import MpspController
 from formation_gnc.control.registry import ALGORITHMS
-from formation_gnc.control.steering import Cost, steer
-from formation_gnc.mission import Mission, Orbit
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import hill_rotation, inertial_from_relative, relative_from_inertial
 from formation_gnc.orbit.propagation import advance_with_transition
@@ -31,17 +31,17 @@ PARAMETERS = {"final_time": FINAL, "step": 50.0, "replan_interval": 100.0, "last
 
 @pytest.fixture(scope="module")
 def eccentric():
-    return Mission(ECCENTRIC, tick=10.0)
+    return CommonParameters(ECCENTRIC, tick=10.0)
 
 
-def law_of(name, mission, limit=0.1, **changes):
+def law_of(name, common, limit=0.1, **changes):
     law = ALGORITHMS[name]
-    return law(law.Parameters(**(PARAMETERS | changes)), mission, Vehicle(100.0, np.full(3, limit)))
+    return law(law.Parameters(**(PARAMETERS | changes)), common, Vehicle(100.0, np.full(3, limit)))
 
 
-def fly(law, mission, estimate, target, error=lambda time: np.zeros(6)):
+def fly(law, common, estimate, target, error=lambda time: np.zeros(6)):
     """States at every tick until the final time, forces and commands; the estimate errs as told."""
-    chief = state_from_elements(Elements(**vars(mission.chief)))
+    chief = state_from_elements(Elements(**vars(common.chief)))
     deputy, goal = inertial_from_relative(chief, START), inertial_from_relative(chief, GOAL)
     states, commands = [START], []
     for index in range(round(FINAL / 10.0)):
@@ -71,10 +71,10 @@ def test_it_arrives_on_time_about_an_eccentric_chief_under_j2(name, eccentric, e
 @pytest.mark.parametrize("name", LAWS)
 def test_a_guess_that_arrives_is_no_plan_yet(name):
     """LQR's history meets the tolerance in a near-linear case, at twenty times the effort of the optimum."""
-    mission, time, count = Mission(Orbit(42164e3), tick=10.0), 30000.0, 300
+    common, time, count = CommonParameters(Orbit(42164e3), tick=10.0), 30000.0, 300
     weights = {"position_error": (200.0,) * 3, "velocity_error": (0.05,) * 3, "thrust": (0.01,) * 3}
-    law = law_of(name, mission, final_time=time, step=time / count, **weights)
-    start, model = np.array([80.0, -60.0, 40.0, 0.0, 0.0, 0.0]), HillModel(mission.mean_motion)
+    law = law_of(name, common, final_time=time, step=time / count, **weights)
+    start, model = np.array([80.0, -60.0, 40.0, 0.0, 0.0, 0.0]), HillModel(common.mean_motion)
     task = Task(NonlinearModel(KeplerChief(42164e3)), 0.0, start, np.zeros(6), time, count)
     phi, gamma = (np.broadcast_to(each, (count, *each.shape)) for each in model.discretise(0.0, task.step))
     cost = Cost(np.zeros((6, 6)), np.eye(3), np.zeros((6, 6)))
@@ -133,9 +133,7 @@ def test_what_cannot_be_planned_is_named_and_lqr_flies(name, changes, words, ecc
     command = law.command(estimate(far, chief=chief), target(GOAL))
     assert words in command.fallback
     assert command.fallback.endswith("LQR flies")
-    np.testing.assert_array_equal(
-        command.force, law.holding.command(estimate(far, chief=chief), target(GOAL)).force
-    )
+    np.testing.assert_array_equal(command.force, law.holding.command(estimate(far, chief=chief), target(GOAL)).force)
 
 
 @pytest.mark.parametrize("law", [MpspController, GmpspController])
@@ -172,7 +170,7 @@ def test_whatever_comes_in_a_finite_force_within_the_limit_comes_out(
     values |= {f"{name}.final_time": final_time, f"{name}.step": 100.0, f"{name}.replan_interval": 0.0}
     if name == "mpsp":
         values["mpsp.prediction"] = prediction
-    pilot = Autopilot("controller", load(ControllerParameters, values))
+    pilot = ControllerManager("controller", load(ControllerParameters, values))
     if on_orbit:
         chief = state_from_elements(Elements(7.5e6, 0.08, 0.87, 0.0, 1.0, 0.0))
     for tick in range(2):

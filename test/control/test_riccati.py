@@ -27,9 +27,7 @@ def test_neokleous_printed_eigenvalues():
     phi, gamma = HillModel(7.2921e-5 * 60.0).discretise(0.0, 0.1)
     gain = stationary_gain(phi, gamma, Weights.scaled(np.eye(6), np.eye(3), 0.1))
     ours = np.sort_complex(np.linalg.eigvals(phi - gamma @ gain))[1::2]
-    cut = (
-        np.floor(1e4 * np.column_stack([ours.real, ours.imag])) / 1e4
-    )  # the thesis cuts digits off, it does not round
+    cut = np.floor(1e4 * np.column_stack([ours.real, ours.imag])) / 1e4  # the thesis cuts digits off, it does not round
     np.testing.assert_allclose(cut, [[0.9156, 0.0462], [0.9159, 0.0458], [0.9161, 0.0454]], rtol=1e-12)
 
 
@@ -101,12 +99,9 @@ def test_finite_gains_minimise_the_cost_over_all_thrust_histories():
         free[step], forced[step] = state, response
     roots = [np.sqrt(terminal if step == steps - 1 else Q) for step in range(steps)]
     rows = np.vstack(
-        [root @ each for root, each in zip(roots, forced, strict=True)]
-        + [np.sqrt(R[0, 0]) * np.eye(3 * steps)]
+        [root @ each for root, each in zip(roots, forced, strict=True)] + [np.sqrt(R[0, 0]) * np.eye(3 * steps)]
     )
-    goal = np.concatenate(
-        [-root @ each for root, each in zip(roots, free, strict=True)] + [np.zeros(3 * steps)]
-    )
+    goal = np.concatenate([-root @ each for root, each in zip(roots, free, strict=True)] + [np.zeros(3 * steps)])
     scale = np.linalg.norm(rows, axis=0)
     thrusts = (np.linalg.lstsq(rows / scale, goal, rcond=None)[0] / scale).reshape(steps, 3)
     state = start
@@ -120,9 +115,7 @@ def test_periodic_gains_are_those_of_the_recursion_tick_by_tick():
     model = TschaunerHempelModel(KeplerChief(1.0e7, eccentricity=0.4))
     ticks, coarse = 2160, 180
     tick = model.period / ticks
-    weights = Weights.scaled(
-        1e-4 * Q, R, tick
-    )  # a loop as slow as the orbit, so that the whole orbit matters
+    weights = Weights.scaled(1e-4 * Q, R, tick)  # a loop as slow as the orbit, so that the whole orbit matters
     every = [model.discretise(index * tick, tick) for index in range(ticks)]
     cost_to_go = np.eye(6)
     truth = np.empty((ticks, 3, 6))
@@ -136,9 +129,7 @@ def test_periodic_gains_are_those_of_the_recursion_tick_by_tick():
     size = np.abs(truth).max(axis=0)
     # Stretches of 2 degrees: second order in their length, and half a tick of phase.
     assert (np.abs(gains - truth[repeats // 2 :: repeats]) / size.max(axis=1, keepdims=True)).max() < 5e-3
-    assert (truth.max(axis=0) - truth.min(axis=0))[0, 0] > 0.5 * np.abs(
-        truth[:, 0, 0]
-    ).min()  # and they do vary
+    assert (truth.max(axis=0) - truth.min(axis=0))[0, 0] > 0.5 * np.abs(truth[:, 0, 0]).min()  # and they do vary
 
 
 @pytest.mark.parametrize(
@@ -151,12 +142,12 @@ def test_periodic_gains_are_those_of_the_recursion_tick_by_tick():
         (np.nan * Q, R, "finite numbers"),
     ],
 )
-def test_inadmissible_weights_are_refused_with_the_reason(state, thrust, message):
+def test_inadmissible_weights_are_rejected_with_the_reason(state, thrust, message):
     with pytest.raises(DesignError, match=message):
         Weights.scaled(state, thrust, 1.0)
 
 
-def test_what_no_thrust_can_stabilise_is_refused():
+def test_what_no_thrust_can_stabilise_is_rejected():
     phi, gamma = HILL.discretise(0.0, 10.0)
     gamma[:, 2] = 0.0  # nothing pushes across the track
     with pytest.raises(DesignError, match="stabilising solution"):

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from formation_gnc.common import CommonParameters, Orbit
 from formation_gnc.control.asre import Asre, AsreParameters
 from formation_gnc.control.controller import Handover, Vehicle
 from formation_gnc.control.finite_horizon import Task
@@ -13,7 +14,6 @@ from formation_gnc.control.sdre import Sdre, SdreParameters
 from formation_gnc.control.sdre_finite import FiniteSdre, SdreFiniteParameters
 from formation_gnc.errors import DesignError
 from formation_gnc.guidance.relative_orbit import RelativeOrbit, RelativeOrbitParameters
-from formation_gnc.mission import Mission, Orbit
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import hill_rotation, inertial_from_relative, relative_from_inertial
 from formation_gnc.orbit.propagation import advance_with_transition
@@ -41,10 +41,10 @@ def fly(law, estimate, target, start, goal, ticks, tick=10.0, chief=CHIEF, distu
     return np.array(states), commands
 
 
-def test_near_a_circular_chief_of_a_point_mass_it_is_lqr(mission, vehicle, estimate, target):
-    chief = state_from_elements(Elements(**vars(mission.chief)))
-    sdre = Sdre(SdreParameters(model="nonlinear", **WEIGHTS), mission, vehicle)
-    lqr = LinearQuadraticRegulator(LqrParameters(**WEIGHTS), mission, vehicle)
+def test_near_a_circular_chief_of_a_point_mass_it_is_lqr(common, vehicle, estimate, target):
+    chief = state_from_elements(Elements(**vars(common.chief)))
+    sdre = Sdre(SdreParameters(model="nonlinear", **WEIGHTS), common, vehicle)
+    lqr = LinearQuadraticRegulator(LqrParameters(**WEIGHTS), common, vehicle)
     state = np.array([0.5, -0.8, 0.3, 1e-3, 2e-3, -1e-3])
     ours = sdre.command(estimate(state, chief=chief), target()).force
     np.testing.assert_allclose(ours, lqr.command(estimate(state), target()).force, rtol=1e-6)
@@ -52,7 +52,7 @@ def test_near_a_circular_chief_of_a_point_mass_it_is_lqr(mission, vehicle, estim
 
 @pytest.mark.parametrize("factorisation", ["sdc1", "sdc2"])
 def test_a_gain_stabilises_the_matrix_it_is_made_for(factorisation):
-    law = Sdre(SdreParameters(factorisation=factorisation, **WEIGHTS), Mission(Orbit(1e7)), STRONG)
+    law = Sdre(SdreParameters(factorisation=factorisation, **WEIGHTS), CommonParameters(Orbit(1e7)), STRONG)
     model = NonlinearModel(KeplerChief.of(CHIEF))
     for time in np.linspace(0.0, model.period, 7):
         dynamics = model.dynamics(float(time), np.array([2e4, -4e4, 3e4, 0, 0, 0]))
@@ -71,7 +71,7 @@ def test_sdre_takes_a_deputy_to_a_free_orbit_far_away_and_stays(estimate, target
         goals.append(relative_from_inertial(leader, deputy))
         leader, deputy = (advance_with_transition(each, np.zeros(3), 10.0, 1)[0] for each in (leader, deputy))
     weights = {"position_error": (100.0,) * 3, "velocity_error": (1.0,) * 3, "thrust": (2.0,) * 3}
-    law = Sdre(SdreParameters(**weights), Mission(Orbit(1e7, 0.15), tick=10.0), STRONG)
+    law = Sdre(SdreParameters(**weights), CommonParameters(Orbit(1e7, 0.15), tick=10.0), STRONG)
     states, commands = fly(
         law,
         estimate,
@@ -85,52 +85,50 @@ def test_sdre_takes_a_deputy_to_a_free_orbit_far_away_and_stays(estimate, target
 
 
 def test_the_integral_removes_a_constant_force(estimate, target):
-    mission = Mission(Orbit(1e7, 0.0), tick=10.0)
+    common = CommonParameters(Orbit(1e7, 0.0), tick=10.0)
     chief = dataclasses.replace(CHIEF, eccentricity=0.0)
     left = {}
     for integral in (0.0, 2e4):
-        law = Sdre(SdreParameters(integral_error=integral, **WEIGHTS), mission, STRONG)
+        law = Sdre(SdreParameters(integral_error=integral, **WEIGHTS), common, STRONG)
         states, _ = fly(law, estimate, target, np.zeros(6), np.zeros(6), 1500, chief=chief, disturbance=1e-3)
         left[integral] = np.linalg.norm(states[-1, :3])
     assert left[0.0] > 1.0
     assert left[2e4] < 0.05 * left[0.0]
 
 
-def test_a_change_of_parameters_keeps_the_integral(mission, vehicle, estimate, target):
-    law, other = (Sdre(SdreParameters(integral_error=100.0, **WEIGHTS), mission, vehicle) for _ in range(2))
-    chief = state_from_elements(Elements(**vars(mission.chief)))
+def test_a_change_of_parameters_keeps_the_integral(common, vehicle, estimate, target):
+    law, other = (Sdre(SdreParameters(integral_error=100.0, **WEIGHTS), common, vehicle) for _ in range(2))
+    chief = state_from_elements(Elements(**vars(common.chief)))
     for tick in range(5):
         law.command(estimate([0.1, 0.1, 0.1, 0, 0, 0], 10.0 * tick, chief=chief), target(time=10.0 * tick))
-    other.take_over(Handover(np.zeros(3), "sdre", law))
+    other.activate(Handover(np.zeros(3), "sdre", law))
     seen, aim = estimate(np.zeros(6), 50.0, chief=chief), target(time=50.0)
     assert other.command(seen, aim).force.any()
     np.testing.assert_allclose(other.command(seen, aim).force, law.command(seen, aim).force, rtol=1e-6)
 
 
-def test_a_gain_that_does_not_exist_is_named_and_lqr_flies(mission, vehicle, estimate, target):
-    law = Sdre(SdreParameters(**WEIGHTS), mission, vehicle)
+def test_a_gain_that_does_not_exist_is_named_and_lqr_flies(common, vehicle, estimate, target):
+    law = Sdre(SdreParameters(**WEIGHTS), common, vehicle)
     state = np.array([5.0, -8.0, 3.0, 0.0, 0.0, 0.0])
     for chief, words in ((np.zeros(6), "no gain"), (np.full(6, np.nan), "no gain")):
         command = law.command(estimate(state, chief=chief), target())
         assert words in command.fallback
         np.testing.assert_array_equal(command.force, law.reserve.command(estimate(state), target()).force)
     # so far away that the matrices overflow
-    chief = state_from_elements(Elements(**vars(mission.chief)))
+    chief = state_from_elements(Elements(**vars(common.chief)))
     with np.errstate(all="ignore"):
-        assert (
-            "LQR flies" in law.command(estimate(1e160 * state, 10.0, chief=chief), target(time=10.0)).fallback
-        )
+        assert "LQR flies" in law.command(estimate(1e160 * state, 10.0, chief=chief), target(time=10.0)).fallback
 
 
-def test_weights_that_are_none_are_refused(mission, vehicle):
+def test_weights_that_are_none_are_rejected(common, vehicle):
     with pytest.raises(DesignError, match="sdre: state_weight has 2 values"):
-        Sdre(SdreParameters(state_weight=(1.0, 2.0)), mission, vehicle)
+        Sdre(SdreParameters(state_weight=(1.0, 2.0)), common, vehicle)
 
 
 @pytest.mark.parametrize(("law", "parameters"), [(FiniteSdre, SdreFiniteParameters), (Asre, AsreParameters)])
 def test_a_reconfiguration_arrives_in_time_and_is_held(law, parameters, estimate, target):
     """5 km about an eccentric chief under J2, from within a kilometre to within metres."""
-    mission = Mission(Orbit(1e7, 0.15), tick=10.0)
+    common = CommonParameters(Orbit(1e7, 0.15), tick=10.0)
     start = np.array([353.0, 707.0, 353.0, 0.22, -0.44, 0.22])
     leader = state_from_elements(CHIEF)
     deputy = inertial_from_relative(leader, np.array([3800.0, 5900.0, 4200.0, 1.0, -4.0, 1.5]))
@@ -138,9 +136,7 @@ def test_a_reconfiguration_arrives_in_time_and_is_held(law, parameters, estimate
     for _ in range(251):
         goals.append(relative_from_inertial(leader, deputy))
         leader, deputy = (advance_with_transition(each, np.zeros(3), 10.0, 1)[0] for each in (leader, deputy))
-    flying = law(
-        parameters(final_time=2000.0, last_plan=60.0, replan_interval=60.0, **WEIGHTS), mission, STRONG
-    )
+    flying = law(parameters(final_time=2000.0, last_plan=60.0, replan_interval=60.0, **WEIGHTS), common, STRONG)
     states, commands = fly(flying, estimate, target, start, lambda time: goals[round(time / 10.0)], 250)
     assert not any(command.fallback for command in commands)
     assert [command.solver for command in commands[199:202]] == ["following", "holding", "holding"]
@@ -151,44 +147,44 @@ def test_a_reconfiguration_arrives_in_time_and_is_held(law, parameters, estimate
     assert off[-1] < 2.0
 
 
-def test_a_design_tells_its_gain_and_its_schedule(mission, vehicle):
-    sdre = Sdre(SdreParameters(model="nonlinear", **WEIGHTS), mission, vehicle).figures()
-    lqr = LinearQuadraticRegulator(LqrParameters(**WEIGHTS), mission, vehicle).figures()
+def test_a_design_tells_its_gain_and_its_schedule(common, vehicle):
+    sdre = Sdre(SdreParameters(model="nonlinear", **WEIGHTS), common, vehicle).figures()
+    lqr = LinearQuadraticRegulator(LqrParameters(**WEIGHTS), common, vehicle).figures()
     (gain,) = sdre.values()
     expected = np.array(lqr["gain [N/m, N/(m/s), N/(m s)]"])
     np.testing.assert_allclose(gain, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
     parameters = AsreParameters(final_time=2000.0, step=30.0, replan_interval=300.0, last_plan=500.0)
-    figures = Asre(parameters, mission, vehicle).figures()
+    figures = Asre(parameters, common, vehicle).figures()
     assert figures["steps of the first plan"] == 67
     assert figures["plans in a reconfiguration"] == 5  # at 0, 300 ... 1200 s
 
 
-def test_a_plan_is_a_pure_function_of_its_task(mission):
+def test_a_plan_is_a_pure_function_of_its_task(common):
     model = NonlinearModel(KeplerChief.of(CHIEF))
     task = Task(model, 0.0, np.array([300.0, 700, 300, 0.2, -0.4, 0.2]), np.zeros(6), 1000.0, 20)
     for law in (
-        FiniteSdre(SdreFiniteParameters(), mission, STRONG),
-        Asre(AsreParameters(), mission, STRONG),
+        FiniteSdre(SdreFiniteParameters(), common, STRONG),
+        Asre(AsreParameters(), common, STRONG),
     ):
         first, second = law.plan(task), law.plan(task)
         np.testing.assert_array_equal(first.acceleration, second.acceleration)
 
 
-def test_a_sequence_that_does_not_converge_is_named(mission, vehicle, estimate, target):
-    law = Asre(AsreParameters(most_iterations=1, **WEIGHTS), mission, vehicle)
-    chief = state_from_elements(Elements(**vars(mission.chief)))
+def test_a_sequence_that_does_not_converge_is_named(common, vehicle, estimate, target):
+    law = Asre(AsreParameters(most_iterations=1, **WEIGHTS), common, vehicle)
+    chief = state_from_elements(Elements(**vars(common.chief)))
     command = law.command(estimate([20.0, 0, 0, 0, 0, 0], chief=chief), target())
     assert command.fallback.startswith("no plan: not converged in 1 iterations")
 
 
 @pytest.mark.parametrize("law", [FiniteSdre, Asre])
-def test_an_axis_without_thrust_gets_none(law, mission, estimate, target):
+def test_an_axis_without_thrust_gets_none(law, common, estimate, target):
     """Without the radial one all can be reached; not so without one that changes the energy, or the third."""
-    chief = state_from_elements(Elements(**vars(mission.chief)))
+    chief = state_from_elements(Elements(**vars(common.chief)))
     for idle, words in ((0, ""), (1, "no plan"), (2, "no plan")):
         limit = np.full(3, 0.05)
         limit[idle] = 0.0
-        flying = law(law.Parameters(**WEIGHTS), mission, Vehicle(100.0, limit))
+        flying = law(law.Parameters(**WEIGHTS), common, Vehicle(100.0, limit))
         command = flying.command(estimate([2.0, 5.0, 5.0, 0, 0, 0], chief=chief), target())
         if words:
             assert words in command.fallback
@@ -198,18 +194,18 @@ def test_an_axis_without_thrust_gets_none(law, mission, estimate, target):
             assert command.force.any()
 
 
-def test_one_step_is_no_plan_and_says_so(mission, vehicle, estimate, target):
-    law = FiniteSdre(SdreFiniteParameters(final_time=20.0, **WEIGHTS), mission, vehicle)
-    chief = state_from_elements(Elements(**vars(mission.chief)))
+def test_one_step_is_no_plan_and_says_so(common, vehicle, estimate, target):
+    law = FiniteSdre(SdreFiniteParameters(final_time=20.0, **WEIGHTS), common, vehicle)
+    chief = state_from_elements(Elements(**vars(common.chief)))
     command = law.command(estimate([20.0, 0, 0, 0, 0, 0], chief=chief), target())
     assert "singular" in command.fallback
 
 
 def test_a_free_orbit_is_followed_with_next_to_no_thrust(estimate, target):
     """About a circular chief of a point mass Hill's ellipse is nearly free: no more is asked."""
-    mission = Mission(Orbit(6978100.0), tick=10.0)
-    orbit = RelativeOrbit(RelativeOrbitParameters(rho=100.0, m=1.0), mission.mean_motion)
-    law = Sdre(SdreParameters(model="nonlinear", **WEIGHTS), mission, Vehicle(100.0, np.full(3, 0.01)))
+    common = CommonParameters(Orbit(6978100.0), tick=10.0)
+    orbit = RelativeOrbit(RelativeOrbitParameters(rho=100.0, m=1.0), common.mean_motion)
+    law = Sdre(SdreParameters(model="nonlinear", **WEIGHTS), common, Vehicle(100.0, np.full(3, 0.01)))
     chief = state_from_elements(Elements(6978100.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     state = orbit.states(np.zeros(1))[0]
     force = law.command(estimate(state, chief=chief), target(state)).force

@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from formation_gnc.control.autopilot import Autopilot, ControllerParameters
+from formation_gnc.control.controller_manager import ControllerManager, ControllerParameters
 from formation_gnc.parameters import load
 from formation_gnc.relative.hill import HillModel
 
@@ -25,7 +25,7 @@ def fly(pilot, ticks, estimate, target, swaps=()):
     model = HillModel(load(ControllerParameters, VALUES).mean_motion)
     for tick in range(ticks):
         if tick in swaps:
-            pilot.adopt(pilot.prepare({"algorithm": swaps[tick]}))
+            pilot.commit(pilot.stage({"algorithm": swaps[tick]}))
         thrust, status = pilot.on_tick(estimate(state, 10.0 * tick), target(time=10.0 * tick))
         assert thrust.time == 10_000_000_000 * tick
         forces.append(thrust.force)
@@ -37,7 +37,7 @@ def fly(pilot, ticks, estimate, target, swaps=()):
 @pytest.mark.parametrize("form", ["output", "full_information"])
 @pytest.mark.parametrize("share", [0.02, 0.1])
 def test_lqr_to_hinf_to_mpc_and_back_twice(form, share, estimate, target):
-    pilot = Autopilot("c", load(ControllerParameters, VALUES | {"handover_step": share, "hinf.form": form}))
+    pilot = ControllerManager("c", load(ControllerParameters, VALUES | {"handover_step": share, "hinf.form": form}))
     swaps = [(60 * index, name) for index, name in enumerate(ROUND)]
     forces, asked, state = fly(pilot, 60 * len(ROUND), estimate, target, swaps)
     assert asked == [name for name in ROUND for _ in range(60)]
@@ -54,16 +54,16 @@ def test_lqr_to_hinf_to_mpc_and_back_twice(form, share, estimate, target):
 
 def test_designs_in_another_thread_are_the_same_and_touch_nothing(estimate, target):
     laws = ["lqr", "hinf", "mpc"]
-    quiet = Autopilot("c", load(ControllerParameters, VALUES))
+    quiet = ControllerManager("c", load(ControllerParameters, VALUES))
     expected, _, _ = fly(quiet, 60, estimate, target)
-    pilot = Autopilot("c", load(ControllerParameters, VALUES))
+    pilot = ControllerManager("c", load(ControllerParameters, VALUES))
     with ThreadPoolExecutor(2) as pool:
-        prepared = [pool.submit(pilot.prepare, {"algorithm": law}) for law in laws * 3]
+        prepared = [pool.submit(pilot.stage, {"algorithm": law}) for law in laws * 3]
         flown, _, _ = fly(pilot, 60, estimate, target)
         designs = [each.result().design for each in prepared]
     np.testing.assert_array_equal(flown, expected)
     here, there = (
-        Autopilot("c", load(ControllerParameters, VALUES)).prepare({"algorithm": "hinf"}).design,
+        ControllerManager("c", load(ControllerParameters, VALUES)).stage({"algorithm": "hinf"}).design,
         designs[1],
     )
     np.testing.assert_array_equal(here.sampled.a, there.sampled.a)
@@ -73,7 +73,12 @@ def test_designs_in_another_thread_are_the_same_and_touch_nothing(estimate, targ
 @pytest.mark.parametrize("law", ["coast", "lqr", "hinf", "mpc"])
 def test_a_flight_repeats_bit_for_bit(law, estimate, target):
     flights = [
-        fly(Autopilot("c", load(ControllerParameters, VALUES | {"algorithm": law})), 80, estimate, target)[0]
+        fly(
+            ControllerManager("c", load(ControllerParameters, VALUES | {"algorithm": law})),
+            80,
+            estimate,
+            target,
+        )[0]
         for _ in range(2)
     ]
     np.testing.assert_array_equal(flights[0], flights[1])

@@ -28,18 +28,13 @@ def places(name: str, phase: float) -> Array:
     """(4, 6) states of the places of a formation at a phase."""
     formation = FORMATIONS[name]
     return np.array(
-        [
-            formation(formation.Parameters(), RATE, slot).states(np.array([phase / RATE]))[0]
-            for slot in range(4)
-        ]
+        [formation(formation.Parameters(), RATE, slot).states(np.array([phase / RATE]))[0] for slot in range(4)]
     )
 
 
 def by_trying(costs: Array) -> float:
     rows = np.arange(len(costs))
-    return min(
-        float(costs[rows, list(each)].sum()) for each in permutations(range(costs.shape[1]), len(costs))
-    )
+    return min(float(costs[rows, list(each)].sum()) for each in permutations(range(costs.shape[1]), len(costs)))
 
 
 @given(tables)
@@ -61,9 +56,7 @@ def test_no_other_assignment_costs_less_when_it_is_weighted(costs: Array, data: 
 @given(st.floats(0.0, math.tau), st.permutations(range(4)))
 def test_a_fleet_that_is_in_formation_is_found_to_be_there(phase: float, order: list[int]) -> None:
     states = places("three_in_plane_one_out", phase)[order]
-    found = assign_with_phase(
-        transfer_costs(states, lambda at: places("three_in_plane_one_out", at), ORBIT, RATE)
-    )
+    found = assign_with_phase(transfer_costs(states, lambda at: places("three_in_plane_one_out", at), ORBIT, RATE))
     # the three in plane look the same a third of a revolution on; xatol of 1e-6 rad at a km, 1e-6 m/s
     assert sum(found.delta_v) < 1e-5
     assert found.slots.index(3) == order.index(3)
@@ -98,12 +91,12 @@ def test_who_has_little_left_is_spared() -> None:
         (np.array([[-1.0]]), "not negative"),
     ],
 )
-def test_what_cannot_be_assigned_is_refused(costs: Array, reason: str) -> None:
+def test_what_cannot_be_assigned_is_rejected(costs: Array, reason: str) -> None:
     with pytest.raises(ConfigurationError, match=reason):
         assign(costs)
 
 
 @pytest.mark.parametrize("tanks", [[1.0, 0.0], [math.inf, 1.0], [-1.0]])
-def test_an_empty_tank_is_refused(tanks: list[float]) -> None:
+def test_an_empty_tank_is_rejected(tanks: list[float]) -> None:
     with pytest.raises(ConfigurationError, match="tanks"):
         fuel_weights(np.array(tanks))

@@ -9,10 +9,11 @@ import pytest
 from numpy.typing import NDArray
 
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.guidance.guide import GuidanceParameters, Guide, check_places
-from formation_gnc.interface import NANOSECONDS, NavigationState, Target
+from formation_gnc.guidance.guidance import Guidance, GuidanceParameters, check_places
 from formation_gnc.parameters import load
+from formation_gnc.records import NavigationState, Target
 from formation_gnc.relative.hill import HillModel
+from formation_gnc.types import NANOSECONDS
 
 Array = NDArray[np.float64]
 
@@ -30,28 +31,24 @@ def estimate(state: Array, seconds: float = 0.0, mass: float = 100.0) -> Navigat
 
 
 def fly(
-    guides: Mapping[str, Guide], states: Array, seconds: float = 0.0, masses: tuple[float, ...] = (100.0,) * 4
+    guides: Mapping[str, Guidance],
+    states: Array,
+    seconds: float = 0.0,
+    masses: tuple[float, ...] = (100.0,) * 4,
 ) -> list[Target]:
     """One tick of all guidances."""
-    seen = {
-        name: estimate(state, seconds, mass) for name, state, mass in zip(guides, states, masses, strict=True)
-    }
-    return [
-        guide.on_tick(seen[name], *(seen[other] for other in guide.others))[0]
-        for name, guide in guides.items()
-    ]
+    seen = {name: estimate(state, seconds, mass) for name, state, mass in zip(guides, states, masses, strict=True)}
+    return [guide.on_tick(seen[name], *(seen[other] for other in guide.others))[0] for name, guide in guides.items()]
 
 
-def guides(**values: Any) -> dict[str, Guide]:
-    return {name: Guide(f"/{name}/guidance", parameters(**values)) for name in FLEET}
+def guides(**values: Any) -> dict[str, Guidance]:
+    return {name: Guidance(f"/{name}/guidance", parameters(**values)) for name in FLEET}
 
 
 def on_the_ring(phase: float) -> Array:
     """States of the four on their own places of a ring."""
     found = [
-        Guide("/deputy1/guidance", parameters(slot=slot, phase=phase)).configuration.design.states(
-            np.zeros(1)
-        )[0]
+        Guidance("/deputy1/guidance", parameters(slot=slot, phase=phase)).configuration.design.states(np.zeros(1))[0]
         for slot in range(4)
     ]
     return np.array(found)
@@ -65,7 +62,7 @@ def propagated(states: Array, seconds: float) -> Array:
 
 def test_the_others_come_with_the_target_in_the_order_of_the_fleet() -> None:
     states = on_the_ring(0.0)
-    guide = Guide("/deputy2/guidance", parameters(slot=1))
+    guide = Guidance("/deputy2/guidance", parameters(slot=1))
     assert guide.others == ("deputy1", "deputy3", "deputy4")
     target, _ = guide.on_tick(estimate(states[1]), estimate(states[0]), None, estimate(states[3]))
     assert target.others.tolist() == [states[0].tolist(), states[3].tolist()]
@@ -76,14 +73,14 @@ def test_the_others_come_with_the_target_in_the_order_of_the_fleet() -> None:
 
 
 def test_alone_there_is_nobody_and_nothing_to_predict() -> None:
-    target, separation = Guide("/deputy1/guidance", parameters(fleet=())).on_tick(estimate(np.ones(6)))
+    target, separation = Guidance("/deputy1/guidance", parameters(fleet=())).on_tick(estimate(np.ones(6)))
     assert target.others.shape == (0, 6)
     assert separation is None
 
 
 def test_neighbours_on_a_ring_are_predicted_to_keep_the_side_of_its_square() -> None:
     states = on_the_ring(0.3)
-    guide = Guide("/deputy1/guidance", parameters(phase=0.3, preview_steps=50, preview_step=60.0))
+    guide = Guidance("/deputy1/guidance", parameters(phase=0.3, preview_steps=50, preview_step=60.0))
     _, separation = guide.on_tick(*map(estimate, states))
     assert separation is not None
     # positions at right angles on y^2 + z^2 = 1 km, radially up to half as much more: |d|^2 = 2 + (dx)^2 with
@@ -94,7 +91,7 @@ def test_neighbours_on_a_ring_are_predicted_to_keep_the_side_of_its_square() -> 
 
 
 def test_a_collision_course_is_found_between_the_points_and_told_once() -> None:
-    guide = Guide("/deputy1/guidance", parameters(fleet=("deputy1", "deputy2"), separation_warning=20.0))
+    guide = Guidance("/deputy1/guidance", parameters(fleet=("deputy1", "deputy2"), separation_warning=20.0))
     n = guide.parameters.mean_motion
     behind, ahead = np.zeros(6), np.zeros(6)
     behind[1], ahead[1] = -1000.0, 1000.0
@@ -132,10 +129,7 @@ def test_all_guidances_of_a_fleet_find_the_same_places_and_the_phase_where_they_
     assert len(phases) == 1
     assert sorted(guide.parameters.slot for guide in fleet.values()) == [0, 1, 2, 3]
     # on the ring already, and so at home; the rates of J2 make the start a little different
-    off = [
-        np.linalg.norm((target.relative_state - state)[:3])
-        for target, state in zip(targets, states, strict=True)
-    ]
+    off = [np.linalg.norm((target.relative_state - state)[:3]) for target, state in zip(targets, states, strict=True)]
     assert max(off) < (1e-2 if model == "hill" else 5.0)
     assert [event.kind for event in fleet["deputy1"].take_events()] == ["assignment"]
 
@@ -166,7 +160,7 @@ def test_with_fuel_who_has_little_left_goes_the_shorter_way() -> None:
 
     def places(assignment: str, masses: tuple[float, float]) -> list[int]:
         fleet = {
-            name: Guide(f"/{name}/guidance", parameters(**values, assignment=assignment))
+            name: Guidance(f"/{name}/guidance", parameters(**values, assignment=assignment))
             for name in ("deputy1", "deputy2")
         }
         fly(fleet, states, masses=masses)
@@ -179,7 +173,7 @@ def test_with_fuel_who_has_little_left_goes_the_shorter_way() -> None:
 
 
 def test_places_stay_until_there_is_a_state_of_everybody() -> None:
-    guide = Guide("/deputy1/guidance", parameters(assignment="delta_v", slot=2))
+    guide = Guidance("/deputy1/guidance", parameters(assignment="delta_v", slot=2))
     states = on_the_ring(0.0)
     guide.on_tick(estimate(states[0]), estimate(states[1]), None, estimate(states[3]))
     assert guide.parameters.slot == 2
@@ -194,7 +188,7 @@ def test_places_stay_until_there_is_a_state_of_everybody() -> None:
 
 @pytest.mark.parametrize("state", [np.full(6, np.nan), np.full(6, 1e200), np.full(6, -np.inf)])
 def test_a_state_that_nobody_can_have_is_nobodys(state: Array) -> None:
-    guide = Guide("/deputy1/guidance", parameters(assignment="delta_v", separation_warning=10.0))
+    guide = Guidance("/deputy1/guidance", parameters(assignment="delta_v", separation_warning=10.0))
     states = on_the_ring(0.0)
     target, separation = guide.on_tick(estimate(state), *map(estimate, states[1:]))
     assert (separation, len(target.others)) == (None, 3)
@@ -222,16 +216,16 @@ def test_a_state_that_nobody_can_have_is_nobodys(state: Array) -> None:
         ),
     ],
 )
-def test_a_fleet_that_cannot_be_is_refused(values: dict[str, Any], reason: str) -> None:
+def test_a_fleet_that_cannot_be_is_rejected(values: dict[str, Any], reason: str) -> None:
     with pytest.raises(ConfigurationError, match=reason):
-        Guide("/deputy1/guidance", parameters(**values))
+        Guidance("/deputy1/guidance", parameters(**values))
 
 
 def test_one_alone_may_not_change_what_is_shared_out() -> None:
-    guide = Guide("/deputy1/guidance", parameters(assignment="delta_v"))
+    guide = Guidance("/deputy1/guidance", parameters(assignment="delta_v"))
     with pytest.raises(ConfigurationError, match="by schedule only"):
-        guide.prepare({"formation": "tetrahedral"})
-    guide.prepare({"separation_warning": 5.0})
+        guide.stage({"formation": "tetrahedral"})
+    guide.stage({"separation_warning": 5.0})
 
 
 def test_a_fleet_that_is_told_one_after_the_other_changes_at_one_tick_to_places_of_one_mind() -> None:
@@ -241,7 +235,7 @@ def test_a_fleet_that_is_told_one_after_the_other_changes_at_one_tick_to_places_
     for second in range(45):
         if second in (10, 20, 30, 39):
             guide = fleet[FLEET[second // 10 - (second < 39)]]
-            guide.adopt(guide.prepare(order))
+            guide.commit(guide.stage(order))
         targets = fly(fleet, states, float(second))
         formation = RING["formation"] if second < 40 else "tetrahedral"
         assert {target.formation for target in targets} == {formation}
@@ -252,17 +246,17 @@ def test_a_fleet_that_is_told_one_after_the_other_changes_at_one_tick_to_places_
     guide = fleet["deputy1"]
     for entry in ("{at: 539.0, formation: helix}", "{at: 539.0, phase: 1.0}"):
         with pytest.raises(ConfigurationError, match=r"at 539 s is not allowed; .* under way until 540 s"):
-            guide.prepare({"schedule": [*order["schedule"], entry]})
-    guide.prepare({"schedule": ["{at: 540.0, formation: helix}", "{at: 100.0, separation_warning: 9.0}"]})
+            guide.stage({"schedule": [*order["schedule"], entry]})
+    guide.stage({"schedule": ["{at: 540.0, formation: helix}", "{at: 100.0, separation_warning: 9.0}"]})
     assert [foreseen for foreseen, _ in guide.foreseen] == []
     assert guide.parameters.formation == "tetrahedral"
 
 
-def test_two_scheduled_changes_of_which_the_second_comes_too_soon_are_refused_before_the_flight() -> None:
+def test_two_scheduled_changes_of_which_the_second_comes_too_soon_are_rejected_before_the_flight() -> None:
     entries = "{at: 100.0, phase: 1.0}", "{at: 599.0, phase: 2.0}"
     with pytest.raises(ConfigurationError, match=r"at 599 s is not allowed; .* under way until 600 s"):
-        Guide("/deputy1/guidance", parameters(reconfiguration_time=500.0, schedule=entries))
-    Guide("/deputy1/guidance", parameters(reconfiguration_time=499.0, schedule=entries))
+        Guidance("/deputy1/guidance", parameters(reconfiguration_time=500.0, schedule=entries))
+    Guidance("/deputy1/guidance", parameters(reconfiguration_time=499.0, schedule=entries))
 
 
 def test_where_places_are_shared_out_the_others_are_predicted_on_their_targets_and_else_to_coast() -> None:
@@ -274,7 +268,7 @@ def test_where_places_are_shared_out_the_others_are_predicted_on_their_targets_a
         fleet = guides(assignment=assignment, **values)
         states = on_the_ring(0.3)
         if assignment == "fixed":
-            fleet["deputy1"] = Guide("/deputy1/guidance", parameters(phase=0.3, **values))
+            fleet["deputy1"] = Guidance("/deputy1/guidance", parameters(phase=0.3, **values))
         else:
             fly(fleet, states)
         seen = [estimate(state, 60.0) for state in propagated(states, 60.0) + off]
@@ -288,7 +282,7 @@ def test_where_places_are_shared_out_the_others_are_predicted_on_their_targets_a
     assert found["delta_v"].passive == pytest.approx(found["fixed"].passive)
 
 
-def test_a_fleet_at_odds_is_refused_at_the_start() -> None:
+def test_a_fleet_at_odds_is_rejected_at_the_start() -> None:
     shared = parameters(assignment="delta_v")
     check_places(dict.fromkeys(FLEET, shared))
     check_places(dict.fromkeys(FLEET, shared) | {"deputy4": parameters(assignment="delta_v", slot=3)})
@@ -300,18 +294,18 @@ def test_a_fleet_at_odds_is_refused_at_the_start() -> None:
         check_places(dict.fromkeys(FLEET, parameters()))
 
 
-def test_a_place_that_another_holds_is_refused_in_flight_and_the_target_stays() -> None:
+def test_a_place_that_another_holds_is_rejected_in_flight_and_the_target_stays() -> None:
     states = on_the_ring(0.0)
-    guide = Guide("/deputy1/guidance", parameters())
+    guide = Guidance("/deputy1/guidance", parameters())
     guide.on_tick(*map(estimate, states))
     with pytest.raises(ConfigurationError, match="deputy3 is there"):
-        guide.prepare({"slot": 2})
+        guide.stage({"slot": 2})
     assert guide.parameters.slot == 0
     off = states + np.array([2.0, -3.0, 2.0, 0.001, 0.002, -0.001])  # as control keeps it
     guide.on_tick(*(estimate(state, 0.5) for state in off))
     with pytest.raises(ConfigurationError, match="deputy3 is there"):
-        guide.prepare({"slot": 2})
-    guide.prepare({"slot": 2, "projected_circular_orbit.size": 1500.0})
+        guide.stage({"slot": 2})
+    guide.stage({"slot": 2, "projected_circular_orbit.size": 1500.0})
     states[2, 3:] *= -1.0  # passes through, and does not hold it
     guide.on_tick(*(estimate(state, 1.0) for state in states))
-    guide.prepare({"slot": 2})
+    guide.stage({"slot": 2})

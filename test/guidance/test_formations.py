@@ -11,18 +11,19 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from formation_gnc.common import CommonParameters, Orbit
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.guidance.formation import Formation
-from formation_gnc.guidance.guide import GuidanceParameters, Guide
+from formation_gnc.guidance.guidance import Guidance, GuidanceParameters
 from formation_gnc.guidance.leader_follower import LeaderFollower, LeaderFollowerParameters
 from formation_gnc.guidance.relative_orbit import RelativeOrbit, RelativeOrbitParameters
-from formation_gnc.interface import NANOSECONDS, NavigationState
-from formation_gnc.mission import Mission, Orbit
 from formation_gnc.parameters import load
+from formation_gnc.records import NavigationState
+from formation_gnc.types import NANOSECONDS
 
 Array = NDArray[np.float64]
 
-MISSION = Mission(Orbit(7.0e6))
+MISSION = CommonParameters(Orbit(7.0e6))
 OMEGA = MISSION.mean_motion
 ORBIT = 2.0 * math.pi / OMEGA
 RATES = np.repeat([1.0, OMEGA], 3)  # a metre, and the speed that goes with it over a radian
@@ -99,11 +100,7 @@ def test_the_relative_orbit_is_an_ellipse_of_two_to_one_in_a_tilted_plane() -> N
 
 
 def test_a_relative_orbit_projects_to_a_circle_as_seen_from_the_earth_when_its_slope_is_two() -> None:
-    y, z = (
-        RelativeOrbit(RelativeOrbitParameters(rho=500.0, m=2.0), OMEGA)
-        .states(np.linspace(0, ORBIT, 50))
-        .T[1:3]
-    )
+    y, z = RelativeOrbit(RelativeOrbitParameters(rho=500.0, m=2.0), OMEGA).states(np.linspace(0, ORBIT, 50)).T[1:3]
     assert np.hypot(y, z) == pytest.approx(1000.0)
 
 
@@ -113,11 +110,9 @@ def test_the_follower_stays_where_it_is_behind_the_leader(separation: float, at:
     assert states.tolist() == [[0.0, -separation, 0.0, 0.0, 0.0, 0.0]] * len(at)
 
 
-def guide(**values: Any) -> Guide:
+def guide(**values: Any) -> Guidance:
     given_values = {name.replace("__", "."): value for name, value in values.items()}
-    return Guide(
-        "/deputy1/guidance", load(GuidanceParameters, {"chief.semi_major_axis": 7.0e6} | given_values)
-    )
+    return Guidance("/deputy1/guidance", load(GuidanceParameters, {"chief.semi_major_axis": 7.0e6} | given_values))
 
 
 @pytest.fixture(scope="module")
@@ -151,14 +146,14 @@ def test_a_formation_is_swapped_in_flight_at_a_tick(at: Callable[[float], Naviga
     target, _ = swapped.on_tick(at(20.0))
     assert target.formation == "relative_orbit"
     assert np.abs(target.relative_state[0]) <= 50.0
-    swapped.adopt(swapped.prepare({"formation": "leader_follower", "leader_follower.separation": 40.0}))
+    swapped.commit(swapped.stage({"formation": "leader_follower", "leader_follower.separation": 40.0}))
     assert swapped.on_tick(at(21.0))[0].relative_state.tolist() == [0.0, -40.0, 0.0, 0.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize(
     "constants", [{"rho": 1e308}, {"a": -1e9}, {"b": 1e300}, {"m": 1e200, "rho": 1e200}, {"n": 1e7}]
 )
-def test_a_formation_whose_targets_would_overflow_is_refused(constants: dict[str, float]) -> None:
+def test_a_formation_whose_targets_would_overflow_is_rejected(constants: dict[str, float]) -> None:
     values = {f"relative_orbit__{name}": value for name, value in constants.items()}
     with pytest.raises(ConfigurationError, match="formation relative_orbit: its parameters put a target"):
         guide(formation="relative_orbit", **values)

@@ -55,9 +55,7 @@ def test_a_circular_orbit_keeps_its_distance_to_the_chief(name: str, size: float
 
 
 @given(sizes, st.integers(2, 7))
-def test_equidistant_satellites_keep_their_distances_which_are_those_of_a_polygon(
-    size: float, satellites: int
-) -> None:
+def test_equidistant_satellites_keep_their_distances_which_are_those_of_a_polygon(size: float, satellites: int) -> None:
     places = rings("equidistant", size, satellites)[..., :3]
     for one, other in itertools.combinations(range(satellites), 2):
         chord = 2.0 * size * math.sin(math.pi * (other - one) / satellites)
@@ -134,7 +132,7 @@ def test_a_listed_place_moves_freely_from_the_state_it_is_given(numbers: list[fl
 
 
 @pytest.mark.parametrize("count", [0, 5, 7])
-def test_a_list_with_part_of_a_place_is_refused(count: int) -> None:
+def test_a_list_with_part_of_a_place_is_rejected(count: int) -> None:
     with pytest.raises(ConfigurationError, match=rf"slot_list.states: {count} numbers"):
         SlotList(SlotListParameters(states=(1.0,) * count), OMEGA)
 
@@ -159,9 +157,7 @@ def test_every_place_of_every_formation_is_free_flight(name: str) -> None:
 
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=6, max_size=6), st.floats(0.0, 6000.0))
-def test_the_conversion_from_lvlh_takes_kremmydas_equations_to_hills(
-    numbers: list[float], time: float
-) -> None:
+def test_the_conversion_from_lvlh_takes_kremmydas_equations_to_hills(numbers: list[float], time: float) -> None:
     # his matrix of 4.1, as printed: x'' = 2 w z', y'' = -w^2 y, z'' = -2 w x' + 3 w^2 z
     matrix = np.zeros((6, 6))
     matrix[:3, 3:] = np.eye(3)

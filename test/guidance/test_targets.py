@@ -1,4 +1,4 @@
-"""Targets carried forward by each model, and what a guide tells and refuses."""
+"""Targets carried forward by each model, and what a guide tells and rejects."""
 
 import math
 from collections.abc import Callable
@@ -10,44 +10,41 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from formation_gnc.common import CommonParameters, Orbit
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.guidance.guide import GuidanceParameters, Guide, check_places
+from formation_gnc.guidance.guidance import Guidance, GuidanceParameters, check_places
 from formation_gnc.guidance.registry import FORMATIONS
 from formation_gnc.guidance.targets import TARGET_MODELS, TargetPath
-from formation_gnc.interface import NANOSECONDS, NavigationState
-from formation_gnc.mission import Mission, Orbit
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
 from formation_gnc.orbit.propagation import advance_with_transition
 from formation_gnc.parameters import load
+from formation_gnc.records import NavigationState
+from formation_gnc.types import NANOSECONDS
 
 Array = NDArray[np.float64]
 
 EQUINOX = (9210 - 0.5) * 86400.0  # s since J2000.0: 20 March 2025, the Sun on the x axis
 
 
-def mission(eccentricity: float = 0.0, anomaly: float = 0.4, inclination: float = 0.9) -> Mission:
-    return Mission(Orbit(7.0e6 / (1.0 - eccentricity), eccentricity, inclination, 0.0, 0.3, anomaly))
+def common(eccentricity: float = 0.0, anomaly: float = 0.4, inclination: float = 0.9) -> CommonParameters:
+    return CommonParameters(Orbit(7.0e6 / (1.0 - eccentricity), eccentricity, inclination, 0.0, 0.3, anomaly))
 
 
 def path(
-    model: str, name: str, about: Mission, phase: float = 0.0, slot: int = 0, **values: float
+    model: str, name: str, about: CommonParameters, phase: float = 0.0, slot: int = 0, **values: float
 ) -> TargetPath:
     formation = FORMATIONS[name]
-    return TARGET_MODELS[model](
-        formation(formation.Parameters(**values), about.mean_motion, slot), phase, about
-    )
+    return TARGET_MODELS[model](formation(formation.Parameters(**values), about.mean_motion, slot), phase, about)
 
 
-closed = st.sampled_from(
-    ["projected_circular_orbit", "general_circular_orbit", "tetrahedral", "helix", "moving_plane"]
-)
+closed = st.sampled_from(["projected_circular_orbit", "general_circular_orbit", "tetrahedral", "helix", "moving_plane"])
 phases = st.floats(-10.0, 10.0)
 
 
 @given(closed, phases)
 def test_the_phase_shifts_a_formation_in_time(name: str, phase: float) -> None:
-    about = mission()
+    about = common()
     times = np.linspace(0.0, 6000.0, 7)
     shifted = path("hill", name, about, phase).states(times)
     expected = path("hill", name, about).states(times + phase / about.mean_motion)
@@ -55,10 +52,8 @@ def test_the_phase_shifts_a_formation_in_time(name: str, phase: float) -> None:
 
 
 @given(closed, phases, st.floats(0.0, math.tau))
-def test_about_a_circular_chief_yamanaka_and_ankersens_path_is_hills(
-    name: str, phase: float, anomaly: float
-) -> None:
-    about = mission(0.0, anomaly)
+def test_about_a_circular_chief_yamanaka_and_ankersens_path_is_hills(name: str, phase: float, anomaly: float) -> None:
+    about = common(0.0, anomaly)
     times = np.linspace(0.0, 6e4, 20)  # ten revolutions
     ours = path("yamanaka_ankersen", name, about, phase).states(times)
     assert ours == pytest.approx(path("hill", name, about, phase).states(times), abs=1e-6)
@@ -66,7 +61,7 @@ def test_about_a_circular_chief_yamanaka_and_ankersens_path_is_hills(
 
 @given(closed, phases, st.floats(0.0, 0.7), st.floats(0.0, math.tau))
 def test_about_an_eccentric_chief_the_path_closes(name: str, phase: float, e: float, anomaly: float) -> None:
-    about = mission(e, anomaly)
+    about = common(e, anomaly)
     period = math.tau / about.mean_motion
     carried = path("yamanaka_ankersen", name, about, phase)
     first = carried.states(np.linspace(0.0, period, 8))
@@ -78,7 +73,7 @@ def test_about_an_eccentric_chief_the_path_closes(name: str, phase: float, e: fl
 def test_about_an_eccentric_chief_the_radial_motion_is_a_sine_of_the_anomaly(
     name: str, phase: float, e: float, anomaly: float
 ) -> None:
-    about = mission(e, anomaly)
+    about = common(e, anomaly)
     n = about.mean_motion
     carried = path("yamanaka_ankersen", name, about, phase)
     start = path("hill", name, about, phase).states(np.array([0.0]))[0]
@@ -87,14 +82,14 @@ def test_about_an_eccentric_chief_the_radial_motion_is_a_sine_of_the_anomaly(
 
 
 def test_a_formation_that_is_to_drift_drifts_in_every_model() -> None:
-    about = mission()
+    about = common()
     for model in TARGET_MODELS:
         carried = path(model, "relative_orbit", about, rho=0.0, a=10.0)
         first, last = carried.states(np.array([0.0, math.tau / about.mean_motion]))
         assert last[1] - first[1] == pytest.approx(-30.0 * math.pi, rel=0.05)  # the rates of J2 add a percent
 
 
-def drift(model: str, about: Mission) -> float:
+def drift(model: str, about: CommonParameters) -> float:
     """Largest distance (m) from a target to a satellite that starts on it and flies ten orbits under J2."""
     carried = path(model, "projected_circular_orbit", about, slot=1)
     step = math.tau / about.mean_motion / 16.0
@@ -103,14 +98,12 @@ def drift(model: str, about: Mission) -> float:
     deputy, worst = inertial_from_relative(chief, targets[0]), 0.0
     for target in targets:
         worst = max(worst, float(np.linalg.norm((relative_from_inertial(chief, deputy) - target)[:3])))
-        chief, deputy = (
-            advance_with_transition(state, np.zeros(3), step, 20)[0] for state in (chief, deputy)
-        )
+        chief, deputy = (advance_with_transition(state, np.zeros(3), step, 20)[0] for state in (chief, deputy))
     return worst
 
 
 def test_each_model_drifts_least_where_it_belongs() -> None:
-    circular, eccentric = mission(), mission(0.1)
+    circular, eccentric = common(), common(0.1)
     # measured: 131 m and 327 m; the start leaves out the short-period terms of J2
     assert drift("j2_mean_motion", circular) < 0.5 * drift("hill", circular)
     assert drift("yamanaka_ankersen", eccentric) < 0.03 * drift("hill", eccentric)
@@ -118,18 +111,16 @@ def test_each_model_drifts_least_where_it_belongs() -> None:
 
 @pytest.mark.parametrize(("size", "told"), [(1000.0, False), (50_000.0, True)])
 def test_the_error_of_a_linear_model_grows_with_the_square_of_the_size(size: float, told: bool) -> None:
-    about = mission()
+    about = common()
     error, extent = path("hill", "projected_circular_orbit", about, size=size).error()
     half, _ = path("hill", "projected_circular_orbit", about, size=size / 2.0).error()
     assert error == pytest.approx(4.0 * half, rel=0.05)
     assert (error > 0.05 * extent) == told
 
 
-def guide(**values: Any) -> Guide:
+def guide(**values: Any) -> Guidance:
     given_values = {name.replace("__", "."): value for name, value in values.items()}
-    return Guide(
-        "/deputy1/guidance", load(GuidanceParameters, {"chief.semi_major_axis": 7.0e6} | given_values)
-    )
+    return Guidance("/deputy1/guidance", load(GuidanceParameters, {"chief.semi_major_axis": 7.0e6} | given_values))
 
 
 @pytest.fixture(scope="module")
@@ -143,7 +134,7 @@ def at() -> Callable[..., NavigationState]:
     return build
 
 
-def told(guided: Guide) -> list[tuple[str, str]]:
+def told(guided: Guidance) -> list[tuple[str, str]]:
     return [(event.kind, event.detail) for event in guided.take_events()]
 
 
@@ -170,9 +161,7 @@ def test_a_change_of_target_tells_the_shortest_time(at: Callable[..., Navigation
     changed, (kind, detail) = told(guided)
     assert changed[0] == "parameters"
     assert kind == "reconfiguration"
-    assert detail.startswith(
-        "leader_follower -> leader_follower, place 0: 200 m to go, for which the thrusters need"
-    )
+    assert detail.startswith("leader_follower -> leader_follower, place 0: 200 m to go, for which the thrusters need")
 
 
 def test_a_target_out_of_reach_in_the_time_given_is_reported_and_flown_to(
@@ -185,15 +174,15 @@ def test_a_target_out_of_reach_in_the_time_given_is_reported_and_flown_to(
 
 def test_no_change_is_taken_while_another_is_under_way(at: Callable[..., NavigationState]) -> None:
     guided = guide(reconfiguration_time=100.0, schedule=["{at: 50, leader_follower.separation: 150}"])
-    guided.adopt(guided.prepare({"leader_follower.separation": 120.0}))
+    guided.commit(guided.stage({"leader_follower.separation": 120.0}))
     guided.on_tick(at(10.0))
     told(guided)
     with pytest.raises(ConfigurationError, match="under way until 110 s; the target stays"):
-        guided.prepare({"leader_follower.separation": 140.0})
+        guided.stage({"leader_follower.separation": 140.0})
     assert guided.on_tick(at(50.0))[0].relative_state[1] == -120.0
-    assert [kind for kind, _ in told(guided)] == ["refused"]
+    assert [kind for kind, _ in told(guided)] == ["rejected"]
     guided.on_tick(at(110.0))
-    guided.adopt(guided.prepare({"leader_follower.separation": 140.0}))
+    guided.commit(guided.stage({"leader_follower.separation": 140.0}))
     assert guided.on_tick(at(111.0))[0].relative_state[1] == -140.0
 
 
@@ -214,19 +203,19 @@ def test_no_change_is_taken_while_another_is_under_way(at: Callable[..., Navigat
         ({"formation": "helix", "helix__size": 9e8}, "no orbit about the Earth"),
     ],
 )
-def test_what_is_no_formation_is_refused_with_a_reason(values: dict[str, Any], reason: str) -> None:
+def test_what_is_no_formation_is_rejected_with_a_reason(values: dict[str, Any], reason: str) -> None:
     with pytest.raises(ConfigurationError, match=reason):
         guide(**values)
 
 
-def test_a_refused_change_leaves_the_target(at: Callable[..., NavigationState]) -> None:
+def test_a_rejected_change_leaves_the_target(at: Callable[..., NavigationState]) -> None:
     guided = guide()
     with pytest.raises(ConfigurationError):
-        guided.prepare({"formation": "tetrahedral", "slot": 9})
+        guided.stage({"formation": "tetrahedral", "slot": 9})
     assert guided.on_tick(at(1.0))[0].relative_state[1] == -100.0
 
 
-def test_two_satellites_on_one_place_are_refused_now_and_later() -> None:
+def test_two_satellites_on_one_place_are_rejected_now_and_later() -> None:
     def parameters(slot: int, **values: Any) -> Any:
         return guide(formation="tetrahedral", slot=slot, **values).parameters
 
@@ -241,7 +230,7 @@ def test_two_satellites_on_one_place_are_refused_now_and_later() -> None:
 CHIEF = state_from_elements(Elements(7.0e6, 0.0, 0.4, 0.0, 0.0, 0.0))
 
 
-def eclipse_of(guided: Guide, seconds: float, chief: Array) -> Array:
+def eclipse_of(guided: Guidance, seconds: float, chief: Array) -> Array:
     time = round(seconds * NANOSECONDS)
     return guided.on_tick(NavigationState(time, np.ones(6), chief, 1.0))[0].eclipse
 

@@ -33,9 +33,7 @@ def test_twice_the_thrust_is_never_slower(error: np.ndarray) -> None:
 
 def test_who_is_there_needs_no_time_and_who_cannot_push_never_comes() -> None:
     assert shortest_time(np.zeros(6), LIMITS, RATE) == 0.0
-    assert (
-        shortest_time(np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0]), np.array([1e-4, 1e-4, 0.0]), RATE) == math.inf
-    )
+    assert shortest_time(np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0]), np.array([1e-4, 1e-4, 0.0]), RATE) == math.inf
 
 
 def test_kremmydas_thrusters_take_days() -> None:

@@ -8,10 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from formation_gnc.interface import Sensor, Vector
 from formation_gnc.navigation import kernels
-from formation_gnc.navigation.measurement import Readings, Track, pseudo_jacobian, pseudo_measurements
-from formation_gnc.navigation.process import Leg, NonlinearProcess, substeps
+from formation_gnc.navigation.measurement import Readings, StateHistory, pseudo_jacobian, pseudo_measurements
+from formation_gnc.navigation.process import Interval, NonlinearProcess, substeps
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import (
     hill_transform,
@@ -21,6 +20,8 @@ from formation_gnc.orbit.frames import (
 )
 from formation_gnc.orbit.propagation import advance_with_transition
 from formation_gnc.plant.sensors import read as truth
+from formation_gnc.records import Sensor
+from formation_gnc.types import Vector
 
 ALL = np.array([int(sensor) for sensor in Sensor])
 AT_REST = np.zeros(3)
@@ -41,9 +42,9 @@ relatives = st.builds(
 )
 
 
-def readings(chief: Vector, value: Vector, age: float = 0.0, track: Track | None = None) -> Readings:
+def readings(chief: Vector, value: Vector, age: float = 0.0, track: StateHistory | None = None) -> Readings:
     ones = np.ones(len(ALL))
-    return Readings(ALL, value, age * ones, ones, chief, track or Track(100), age > 0.0)
+    return Readings(ALL, value, age * ones, ones, chief, track or StateHistory(100), age > 0.0)
 
 
 @given(chiefs, relatives)
@@ -51,9 +52,7 @@ def test_expected_readings_are_those_of_the_truth(chief: Vector, relative: Vecto
     deputy = inertial_from_relative(chief, relative)
     expected, _ = kernels.read_relative(ALL, chief, relative)
     # one rounding of a 7000 to 43000 km coordinate, some roundings on the way
-    np.testing.assert_allclose(
-        expected, [truth(sensor, deputy, chief) for sensor in Sensor], rtol=1e-14, atol=3e-8
-    )
+    np.testing.assert_allclose(expected, [truth(sensor, deputy, chief) for sensor in Sensor], rtol=1e-14, atol=3e-8)
 
 
 @given(chiefs, relatives)
@@ -69,9 +68,7 @@ def test_jacobians_are_the_slopes_of_the_readings(chief: Vector, relative: Vecto
         difference[3] = (difference[3] + pi) % (2 * pi) - pi  # right ascension has a seam
         slope = difference / (2.0 * step)
         # Rounding of the readings over the step; the curvature of the range.
-        scale = np.array([1e-8, 1e-11, 1e-15, 1e-15, 1e-8]) / step + np.array(
-            [1e-9, 1e-9, 1e-13, 1e-13, 5e-3]
-        )
+        scale = np.array([1e-8, 1e-11, 1e-15, 1e-15, 1e-8]) / step + np.array([1e-9, 1e-9, 1e-13, 1e-13, 5e-3])
         np.testing.assert_array_less(np.abs(jacobian[:, column] - slope), scale * 5)
 
 
@@ -107,7 +104,7 @@ def test_a_prediction_is_the_inertial_flight_of_both_satellites(
     tick = 10.0
     later = kernels.coast(chief, AT_REST, tick, 1)
     covariance, noise = np.diag([1.0, 2.0, 3.0, 1e-6, 2e-6, 3e-6]), np.eye(6) * 1e-9
-    leg = Leg(chief, later, acceleration, tick, 1)
+    leg = Interval(chief, later, acceleration, tick, 1)
     state, spread, transition = NonlinearProcess().predict(leg, relative, covariance, noise)
     inertial = acceleration @ np.array([hill_transform(chief)[row, :3] for row in range(3)])
     deputy, flight = advance_with_transition(inertial_from_relative(chief, relative), inertial, tick, 1)
@@ -126,12 +123,12 @@ def test_a_late_reading_is_expected_where_the_deputy_was_when_it_was_taken(
     chief: Vector, relative: Vector, age: float
 ) -> None:
     tick, force = 10.0, np.array([1e-3, -2e-3, 5e-4])
-    track, places = Track(6), [(chief, inertial_from_relative(chief, relative))]
+    track, places = StateHistory(6), [(chief, inertial_from_relative(chief, relative))]
     state = relative
     for _ in range(6):
         before = places[-1][0]
         after = kernels.coast(before, AT_REST, tick, 1)
-        leg = Leg(before, after, force, tick, 1)
+        leg = Interval(before, after, force, tick, 1)
         track.add(leg)
         state, _, _ = NonlinearProcess().predict(leg, state, np.zeros((6, 6)), np.zeros((6, 6)))
         places.append((after, inertial_from_relative(after, state)))

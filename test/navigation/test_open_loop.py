@@ -19,7 +19,7 @@ pytest.importorskip("rclpy")
 
 def recorded(path: Path, change_at: int = -1, **navigation: Any) -> Path:
     """Ten minutes of the default scenario with every trouble that sensors have, as a bag."""
-    from formation_gnc.nodes.record_in_process import InProcessRecorder
+    from formation_gnc.transport.in_process_recorder import InProcessRecorder
 
     trouble = {
         "deputy1.sensors.radius.dropout": 0.3,
@@ -41,7 +41,7 @@ def recorded(path: Path, change_at: int = -1, **navigation: Any) -> Path:
         while not run.plant.finished:
             if run.plant.tick == change_at:
                 navigator = run.satellites[0].navigator
-                navigator.adopt(navigator.prepare({"filter": "ukf", "gate": 6.0}))
+                navigator.commit(navigator.stage({"filter": "ukf", "gate": 6.0}))
             run.tick(sink)
         run.finish(sink)
     return path
@@ -67,7 +67,7 @@ def test_the_unchanged_filter_gives_the_recorded_bits(
     same = compare(Bag(recorded(tmp_path / "bag", change_at, **navigation)), "deputy1", {})
     assert same.identical
     assert same.now == same.recorded
-    assert same.now.refusals["gate"] > 0
+    assert same.now.rejections["gate"] > 0
 
 
 def test_another_filter_gives_other_estimates_of_the_same_flight(bag: Path) -> None:

@@ -59,6 +59,6 @@ def test_one_under_way_begins_now_and_one_that_outlasts_the_time_ends_with_it(
     assert eclipses(inside, 600.0, 30.0, EQUINOX) == pytest.approx(np.array([[0.0, 600.0]]))
 
 
-def test_an_orbit_that_meets_the_earth_is_refused() -> None:
+def test_an_orbit_that_meets_the_earth_is_rejected() -> None:
     with pytest.raises(ImpactError):
         eclipses(np.zeros(6), 600.0, 30.0)

@@ -1,4 +1,4 @@
-"""Keplerian elements: round trips through every singular case, published examples, refusals."""
+"""Keplerian elements: round trips through every singular case, published examples, rejections."""
 
 from math import pi, radians, tau
 
@@ -128,7 +128,7 @@ def test_mean_and_true_anomaly_are_inverse(anomaly, eccentricity):
         ({"semi_major_axis": float("inf")}, "semi_major_axis is inf"),
     ],
 )
-def test_elements_that_cannot_be_flown_are_refused(change, message):
+def test_elements_that_cannot_be_flown_are_rejected(change, message):
     values = {
         "semi_major_axis": 7e6,
         "eccentricity": 0.0,
@@ -152,6 +152,6 @@ def test_elements_that_cannot_be_flown_are_refused(change, message):
         ([7e6, 0, 0], "six finite"),
     ],
 )
-def test_states_that_are_no_orbit_are_refused(state, message):
+def test_states_that_are_no_orbit_are_rejected(state, message):
     with pytest.raises(ConfigurationError, match=message):
         elements_from_state(np.array(state, dtype=float))

@@ -47,9 +47,7 @@ def test_relative_state_survives_the_round_trip(chief, relative):
 @given(chiefs(), RELATIVE)
 def test_transform_is_the_linear_form_of_the_exact_map(chief, relative):
     deputy = inertial_from_relative(chief, relative)
-    assert hill_transform(chief) @ (deputy - chief) == pytest.approx(
-        relative_from_inertial(chief, deputy), abs=1e-7
-    )
+    assert hill_transform(chief) @ (deputy - chief) == pytest.approx(relative_from_inertial(chief, deputy), abs=1e-7)
     assert hill_transform(chief) @ hill_transform_inverse(chief) == pytest.approx(np.eye(6), abs=1e-14)
 
 
@@ -99,7 +97,7 @@ def test_under_j2_the_derivative_differs_by_the_tilt_of_the_orbit_plane():
     assert derivative == pytest.approx(expected, abs=2e-6)
 
 
-def test_a_chief_without_orbit_plane_is_refused():
+def test_a_chief_without_orbit_plane_is_rejected():
     with pytest.raises(ConfigurationError, match="no orbit plane"):
         hill_rotation(np.array([7e6, 0.0, 0.0, 1.0, 0.0, 0.0]))
     with pytest.raises(ConfigurationError, match="no orbit plane"):

@@ -35,23 +35,23 @@ def test_cache_lies_where_numba_is_told(roots):
 
 
 def test_cache_goes_to_the_user_when_the_package_is_read_only(roots, monkeypatch):
-    """Root can write anywhere, so the refusal is played."""
+    """Root can write anywhere, so the rejection is played."""
     write = tempfile.TemporaryFile
 
-    def refuse(dir):
+    def reject(dir):
         if Path(dir).is_relative_to(roots / "user"):
             return write(dir=dir)
         raise PermissionError(dir)
 
-    monkeypatch.setattr(jit.tempfile, "TemporaryFile", refuse)
+    monkeypatch.setattr(jit.tempfile, "TemporaryFile", reject)
     assert Path(jit._cache_directory()).parent == roots / "user" / "formation_gnc"
 
 
 def test_nothing_writable_means_no_cache(roots, monkeypatch):
-    def refuse(dir):
+    def reject(dir):
         raise PermissionError(dir)
 
-    monkeypatch.setattr(jit.tempfile, "TemporaryFile", refuse)
+    monkeypatch.setattr(jit.tempfile, "TemporaryFile", reject)
     assert jit._cache_directory() == ""
 
 

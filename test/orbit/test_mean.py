@@ -92,9 +92,7 @@ def test_mean_orbit_has_the_energy_of_the_true_one(orbit):
     st.floats(0.0, tau),
 )
 def test_transformation_inverts_in_every_singular_case(eccentricity, inclination, perigee, anomaly):
-    state = state_from_elements(
-        Elements(7e6 / (1 - eccentricity), eccentricity, inclination, 0.3, perigee, anomaly)
-    )
+    state = state_from_elements(Elements(7e6 / (1 - eccentricity), eccentricity, inclination, 0.3, perigee, anomaly))
     mean = mean_state(state)
     assert np.isfinite(mean).all()
     assert 10.0 < np.linalg.norm((mean - state)[:3]) < 50e3
@@ -114,9 +112,7 @@ def test_transformation_is_smooth_through_the_circular_and_equatorial_orbit():
 
 def test_elements_and_states_tell_the_same():
     orbit = Elements(7e6, 0.01, 1.0, 0.3, 0.2, 0.1)
-    assert state_from_elements(mean_elements(orbit)) == pytest.approx(
-        mean_state(state_from_elements(orbit)), rel=1e-12
-    )
+    assert state_from_elements(mean_elements(orbit)) == pytest.approx(mean_state(state_from_elements(orbit)), rel=1e-12)
     again = osculating_elements(mean_elements(orbit))
     assert again.semi_major_axis == pytest.approx(7e6, rel=1e-13)
     assert again.eccentricity == pytest.approx(0.01, abs=1e-13)

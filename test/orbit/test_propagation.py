@@ -29,9 +29,7 @@ def reference(elements, duration, thrust=(0.0, 0.0, 0.0)):
         x, y, z = position
         r = np.sqrt(x * x + y * y + z * z)
         factor = 1.5 * J2 * MU * EARTH_RADIUS**2 / r**5
-        oblate = factor * np.array(
-            [x * (5 * z**2 / r**2 - 1), y * (5 * z**2 / r**2 - 1), z * (5 * z**2 / r**2 - 3)]
-        )
+        oblate = factor * np.array([x * (5 * z**2 / r**2 - 1), y * (5 * z**2 / r**2 - 1), z * (5 * z**2 / r**2 - 3)])
         return -MU * position / r**3 + oblate
 
     def derivative(_, state):
@@ -58,9 +56,7 @@ def test_held_thrust_agrees_with_independent_integration():
 def test_the_method_is_of_order_eight(elements, coarse):
     duration = elements.period
     truth = reference(elements, duration)
-    error = [
-        np.linalg.norm((fly(elements, count, duration / count) - truth)[:3]) for count in (coarse, 2 * coarse)
-    ]
+    error = [np.linalg.norm((fly(elements, count, duration / count) - truth)[:3]) for count in (coarse, 2 * coarse)]
     assert error[1] > 1e-6  # above rounding, so that the ratio says something
     assert 7.5 < np.log2(error[0] / error[1]) < 9.5
 
@@ -120,10 +116,7 @@ def test_gradient_is_the_derivative_of_acceleration():
     position = state_from_elements(LEO)[:3]
     step = 10.0
     numeric = np.array(
-        [
-            (acceleration(position + step * e) - acceleration(position - step * e)) / (2 * step)
-            for e in np.eye(3)
-        ]
+        [(acceleration(position + step * e) - acceleration(position - step * e)) / (2 * step) for e in np.eye(3)]
     ).T
     # Rounding of the 8 m/s^2, 1e-15, over twice the step; truncation is 1e-18.
     assert gradient(position) == pytest.approx(numeric, rel=1e-8, abs=3e-16)
@@ -133,9 +126,7 @@ def test_gradient_is_the_derivative_of_acceleration():
 def test_transition_matrix_is_the_derivative_of_the_state_and_symplectic():
     state, thrust = state_from_elements(LEO), np.array([1e-4, 0.0, -1e-4])
     end, transition = advance_with_transition(state, thrust, 60.0, 4)
-    assert end == pytest.approx(
-        Propagator(60.0, substeps=4).advance(0.0, state[None], thrust[None])[0], abs=0.0
-    )
+    assert end == pytest.approx(Propagator(60.0, substeps=4).advance(0.0, state[None], thrust[None])[0], abs=0.0)
     for column, step in enumerate([1.0] * 3 + [1e-3] * 3):
         change = step * np.eye(6)[column]
         ahead, _ = advance_with_transition(state + change, thrust, 60.0, 4)

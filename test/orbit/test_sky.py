@@ -30,14 +30,10 @@ def test_directions_agree_with_the_jpl_ephemeris_from_1950_to_2050(ephemeris, bo
     if body == "moon":
         truth = ephemeris[3, 301].compute(2451545.0 + days)[:3] - earth
     else:
-        sun_and_earth = (
-            ephemeris[0, 10].compute(2451545.0 + days)[:3] - ephemeris[0, 3].compute(2451545.0 + days)[:3]
-        )
+        sun_and_earth = ephemeris[0, 10].compute(2451545.0 + days)[:3] - ephemeris[0, 3].compute(2451545.0 + days)[:3]
         truth = sun_and_earth - earth
     ours = np.array([SERIES[body](day * DAY) for day in days]) / 1e3
-    apart = np.degrees(
-        np.arctan2(np.linalg.norm(np.cross(ours, truth.T), axis=1), np.sum(ours * truth.T, axis=1))
-    )
+    apart = np.degrees(np.arctan2(np.linalg.norm(np.cross(ours, truth.T), axis=1), np.sum(ours * truth.T, axis=1)))
     assert apart.max() < angle
     lengths = np.linalg.norm(ours, axis=1) / np.linalg.norm(truth, axis=0)
     assert np.abs(lengths - 1.0).max() < distance
@@ -58,9 +54,7 @@ def test_distances_stay_between_the_almanac_extremes():
     assert 0.9832 < suns.min() < 0.9834
     assert 1.0166 < suns.max() < 1.0168
     moons = np.array([np.linalg.norm(moon(day * DAY)) for day in days])
-    assert (
-        356.3e6 < moons.min() < 357.5e6
-    )  # closest perigee and farthest apogee of the Moon: 356,400, 406,700 km
+    assert 356.3e6 < moons.min() < 357.5e6  # closest perigee and farthest apogee of the Moon: 356,400, 406,700 km
     assert 406.0e6 < moons.max() < 407.2e6
 
 

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.interface import Measurement, Truth
 from formation_gnc.orbit.constants import EARTH_RADIUS, J2, MU
 from formation_gnc.parameters import load
 from formation_gnc.plant.plant import Plant, PlantParameters
+from formation_gnc.records import Measurement, Truth
 
 Array = NDArray[np.float64]
 
@@ -33,9 +33,7 @@ ROUNDING = 1e-7  # m; a few units in the last place of an orbit's radius
 
 
 def plant(**values: Any) -> Plant:
-    return Plant(
-        load(PlantParameters, VALUES | {name.replace("__", "."): value for name, value in values.items()})
-    )
+    return Plant(load(PlantParameters, VALUES | {name.replace("__", "."): value for name, value in values.items()}))
 
 
 def observe(flown: Plant) -> tuple[Truth, dict[str, Measurement]]:
@@ -62,11 +60,7 @@ def gravity(position: Array) -> Array:
     x, y, z = position
     r = math.sqrt(x * x + y * y + z * z)
     k, u = 1.5 * J2 * (EARTH_RADIUS / r) ** 2, 5.0 * (z / r) ** 2
-    return (
-        -MU
-        / r**3
-        * np.array([x * (1.0 + k * (1.0 - u)), y * (1.0 + k * (1.0 - u)), z * (1.0 + k * (3.0 - u))])
-    )
+    return -MU / r**3 * np.array([x * (1.0 + k * (1.0 - u)), y * (1.0 + k * (1.0 - u)), z * (1.0 + k * (3.0 - u))])
 
 
 def integrated(state: Array, duration: float, acceleration: Array) -> Array:
@@ -145,14 +139,10 @@ def test_without_thrust_mass_does_not_matter_and_with_it_acceleration_is_force_o
     light, heavy = plant(deputy1__mass=50.0), plant(deputy1__mass=200.0)
     fly(light, 20, {"deputy1": np.zeros(3)})
     fly(heavy, 20, {"deputy1": np.zeros(3)})
-    assert np.array_equal(
-        observe(light)[0].deputies[0].inertial_state, observe(heavy)[0].deputies[0].inertial_state
-    )
+    assert np.array_equal(observe(light)[0].deputies[0].inertial_state, observe(heavy)[0].deputies[0].inertial_state)
     light.step({"deputy1": np.array([0.001, 0.0, 0.0])})
     heavy.step({"deputy1": np.array([0.004, 0.0, 0.0])})
-    assert np.array_equal(
-        observe(light)[0].deputies[0].inertial_state, observe(heavy)[0].deputies[0].inertial_state
-    )
+    assert np.array_equal(observe(light)[0].deputies[0].inertial_state, observe(heavy)[0].deputies[0].inertial_state)
 
 
 @pytest.mark.parametrize(
@@ -266,7 +256,7 @@ def test_a_duration_of_part_ticks_ends_with_the_last_tick_that_began() -> None:
     assert stamps == [0, 2_000_000_000, 4_000_000_000]
 
 
-def refusal(values: dict[str, Any]) -> str:
+def rejection(values: dict[str, Any]) -> str:
     with pytest.raises(ConfigurationError) as raised:
         Plant(load(PlantParameters, values))
     return str(raised.value)
@@ -298,8 +288,8 @@ def refusal(values: dict[str, Any]) -> str:
         ),
     ],
 )
-def test_what_cannot_be_flown_is_refused_in_words(name: str, value: Any, words: str) -> None:
-    assert refusal(VALUES | {name: value}).startswith(words)
+def test_what_cannot_be_flown_is_rejected_in_words(name: str, value: Any, words: str) -> None:
+    assert rejection(VALUES | {name: value}).startswith(words)
 
 
 @pytest.mark.parametrize(
@@ -315,4 +305,4 @@ def test_what_cannot_be_flown_is_refused_in_words(name: str, value: Any, words: 
 def test_names_of_deputies_are_different_and_fit_for_namespaces(names: list[str], words: str) -> None:
     values = {name: value for name, value in VALUES.items() if not name.startswith("deputy1")}
     states = {f"{name}.relative_state": AWAY for name in names}
-    assert refusal(values | states | {"deputies": names}) == f"parameter deputies: {words}"
+    assert rejection(values | states | {"deputies": names}) == f"parameter deputies: {words}"

@@ -11,11 +11,12 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.stats import kstest
 
-from formation_gnc.interface import NANOSECONDS, Sensor
 from formation_gnc.orbit.constants import MU
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.parameters import load
 from formation_gnc.plant.sensors import Sensors, SensorSuite, read
+from formation_gnc.records import Sensor
+from formation_gnc.types import NANOSECONDS
 
 Array = NDArray[np.float64]
 

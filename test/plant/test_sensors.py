@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.interface import NANOSECONDS, Sensor
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.plant.sensors import SensorParameters, Sensors, SensorSuite, read
+from formation_gnc.records import Sensor
+from formation_gnc.types import NANOSECONDS
 
 CHIEF = state_from_elements(Elements(7e6, 0.01, 0.9, 0.3, 0.2, 0.1))
 DEPUTY = CHIEF + np.array([100.0, -200.0, 50.0, 0.1, 0.2, -0.3])
@@ -39,9 +40,7 @@ def test_noise_and_bias_are_those_asked_for() -> None:
 
 
 def test_only_what_is_on_reads_and_each_at_its_interval() -> None:
-    arrived = flown(
-        100, latitude=SensorParameters(sigma=1e-6, interval=7.0), range_rate=SensorParameters(on=False)
-    )
+    arrived = flown(100, latitude=SensorParameters(sigma=1e-6, interval=7.0), range_rate=SensorParameters(on=False))
     assert [tick for tick, _, _ in arrived[Sensor.RADIUS]] == list(range(0, 100, 10))
     assert [tick for tick, _, _ in arrived[Sensor.LATITUDE]] == list(range(0, 100, 7))
     assert not arrived[Sensor.RANGE_RATE]
@@ -99,6 +98,6 @@ def test_the_errors_of_different_sensors_are_independent() -> None:
 
 
 @pytest.mark.parametrize("name", ["interval", "latency"])
-def test_what_is_not_whole_ticks_is_refused_by_name(name: str) -> None:
+def test_what_is_not_whole_ticks_is_rejected_by_name(name: str) -> None:
     with pytest.raises(ConfigurationError, match=rf"deputy1\.sensors\.latitude\.{name}.*0\.5"):
         flown(1, latitude=SensorParameters(**{name: 0.5}))

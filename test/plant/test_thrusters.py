@@ -183,9 +183,7 @@ def test_a_command_that_is_not_finite_gives_no_thrust(bad):
     st.floats(0.0, 20.0),
     st.floats(50.0, 50.0001),
 )
-def test_whatever_the_configuration_force_and_mass_stay_within_bounds(
-    command, eclipse, total, quantum, lag, mass
-):
+def test_whatever_the_configuration_force_and_mass_stay_within_bounds(command, eclipse, total, quantum, lag, mass):
     one = thruster(
         limit=(0.02, 0.02, 0.02),
         total_limit=total,
@@ -201,7 +199,7 @@ def test_whatever_the_configuration_force_and_mass_stay_within_bounds(
     assert 50.0 <= state.mass <= mass
 
 
-def test_bad_masses_and_parameters_are_refused():
+def test_bad_masses_and_parameters_are_rejected():
     with pytest.raises(ConfigurationError, match=r"mass: -1\.0 kg"):
         thruster().start(-1.0)
     with pytest.raises(ConfigurationError, match=r"at least the dry mass, 50\.0 kg"):

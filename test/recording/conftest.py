@@ -48,9 +48,7 @@ def flown(ticks: int, first: int = 0) -> list[Recorded]:
         stamp = Time(sec=tick, nanosec=5 * 10**8)
         readings = [0, 1, 2] if tick % 10 == 0 else []
         deputies = [
-            SatelliteTruth(
-                name=name, inertial_state=rng.normal(size=6), mass=100.0 - tick, eclipse=tick % 3 == 0
-            )
+            SatelliteTruth(name=name, inertial_state=rng.normal(size=6), mass=100.0 - tick, eclipse=tick % 3 == 0)
             for name in ("deputy1", "the second deputy")
         ]
         header = Header(stamp=stamp, frame_id="hill")
@@ -63,9 +61,7 @@ def flown(ticks: int, first: int = 0) -> list[Recorded]:
             ),
             record(
                 "/deputy1/measurement",
-                Measurement(
-                    header=header, sensor=readings, reading=rng.normal(size=len(readings)), mass=99.5
-                ),
+                Measurement(header=header, sensor=readings, reading=rng.normal(size=len(readings)), mass=99.5),
                 stamp_ns,
             ),
             record(
@@ -83,9 +79,7 @@ def flown(ticks: int, first: int = 0) -> list[Recorded]:
             record("/deputy1/thrust", Thrust(header=header, force=rng.normal(size=3)), stamp_ns),
         ]
         if tick % 25 == 3:
-            event = Event(
-                header=header, tick=tick, node="/plant", kind="miss", detail="zu spät " * (tick % 4)
-            )
+            event = Event(header=header, tick=tick, node="/plant", kind="miss", detail="zu spät " * (tick % 4))
             messages.append(record("/events", event, stamp_ns))
     return messages
 

@@ -105,9 +105,7 @@ def test_arrays_equal_what_ros_itself_deserialises(messages) -> None:
             assert np.array_equal(arrays[field][row], getattr(truth, field)), field
 
 
-@given(
-    st.lists(st.builds(Event, node=text, kind=text, detail=text, tick=st.integers(0, 2**64 - 1)), min_size=1)
-)
+@given(st.lists(st.builds(Event, node=text, kind=text, detail=text, tick=st.integers(0, 2**64 - 1)), min_size=1))
 def test_text_of_any_length_comes_back(messages) -> None:
     arrays = installed_type("formation_gnc_msgs/msg/Event").arrays([serialize_message(m) for m in messages])
     for field in ("node", "kind", "detail", "tick"):
@@ -154,7 +152,7 @@ def test_big_endian_messages_are_read() -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b"\x00\x01", b"\x00\x01\x00\x00\x00", b"\x00\x07\x00\x00" + bytes(90)])
-def test_bytes_that_do_not_fit_are_refused(data) -> None:
+def test_bytes_that_do_not_fit_are_rejected(data) -> None:
     kind = installed_type("formation_gnc_msgs/msg/Thrust")
     with pytest.raises(ConfigurationError, match="Thrust"):
         kind.arrays([data])
@@ -163,7 +161,7 @@ def test_bytes_that_do_not_fit_are_refused(data) -> None:
 
 
 @given(st.binary(max_size=120))
-def test_any_bytes_are_read_or_refused(data) -> None:
+def test_any_bytes_are_read_or_rejected(data) -> None:
     kind = installed_type("formation_gnc_msgs/msg/Truth")
     for use in (kind.arrays, lambda messages: kind.message(messages[0])):
         with suppress(ConfigurationError):
@@ -180,14 +178,12 @@ def test_any_bytes_are_read_or_refused(data) -> None:
         (b"wstring x", "ros2msg"),
     ],
 )
-def test_unknown_schemas_are_refused_by_name(schema, encoding) -> None:
+def test_unknown_schemas_are_rejected_by_name(schema, encoding) -> None:
     with pytest.raises(ConfigurationError, match="a_msgs/msg/B"):
         MessageType("a_msgs/msg/B", schema, encoding).arrays([bytes([0, 1, 0, 0]) + bytes(8)])
 
 
-def test_identical_bags_have_no_differences_whatever_order_processes_answered_in(
-    tmp_path, write_bag, flight
-) -> None:
+def test_identical_bags_have_no_differences_whatever_order_processes_answered_in(tmp_path, write_bag, flight) -> None:
     first = write_bag(tmp_path / "first", flight)
     otherwise = [m for _, tick in groupby(flight, key=lambda m: m.stamp_ns) for m in reversed(list(tick))]
     second = write_bag(tmp_path / "second", otherwise)
@@ -226,9 +222,7 @@ def test_the_first_difference_is_named_by_topic_stamp_and_field(tmp_path, write_
 def test_a_topic_in_one_bag_alone_is_a_difference_and_in_none_an_error(tmp_path, write_bag, flight) -> None:
     first = Bag(write_bag(tmp_path / "a", flight))
     second = Bag(write_bag(tmp_path / "b", [m for m in flight if m.topic != "/events"]))
-    assert [(d.topic, d.stamp_ns) for d in identical(first, second, ["/events"])] == [
-        ("/events", 3_500_000_000)
-    ]
+    assert [(d.topic, d.stamp_ns) for d in identical(first, second, ["/events"])] == [("/events", 3_500_000_000)]
     assert [d.second for d in identical(second, first, ["/events"])] != [None]
     with pytest.raises(ConfigurationError, match="/nothing"):
         identical(first, second, ["/nothing"])
@@ -257,9 +251,7 @@ def test_other_recorders_files_are_read(tmp_path, flight, compression, chunked) 
     with path.open("wb") as stream:
         writer = Writer(stream, compression=compression, use_chunking=chunked)
         writer.start(profile="ros2")
-        schema = writer.register_schema(
-            "rosgraph_msgs/msg/Clock", "ros2msg", b"builtin_interfaces/Time clock\n"
-        )
+        schema = writer.register_schema("rosgraph_msgs/msg/Clock", "ros2msg", b"builtin_interfaces/Time clock\n")
         channel = writer.register_channel("/clock", "cdr", schema)
         for stamp in (3, 1, 2):
             writer.add_message(channel, stamp, flight[0].data, stamp)
@@ -307,8 +299,7 @@ def test_read_gives_a_frame_per_topic(bag_path) -> None:
     frames = read(bag_path)
     assert isinstance(frames["/truth"], pd.DataFrame)
     assert (
-        frames["/deputy1/thrust"]["force.2"].tolist()
-        == Bag(bag_path).arrays("/deputy1/thrust")["force"][:, 2].tolist()
+        frames["/deputy1/thrust"]["force.2"].tolist() == Bag(bag_path).arrays("/deputy1/thrust")["force"][:, 2].tolist()
     )
     assert frames["/clock"].index.name == "time"
 
@@ -327,8 +318,6 @@ def test_read_without_pandas_says_how_to_get_it(bag_path, monkeypatch) -> None:
 
 
 def test_reading_needs_no_ros() -> None:
-    script = (
-        "import sys, formation_gnc.recording; print({'rclpy', 'ament_index_python'} & sys.modules.keys())"
-    )
+    script = "import sys, formation_gnc.recording; print({'rclpy', 'ament_index_python'} & sys.modules.keys())"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"

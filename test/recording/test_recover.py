@@ -26,9 +26,7 @@ class Messages(list):
         return f"<{len(self)} messages>"
 
 
-on_one_file = settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+on_one_file = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 @pytest.fixture(scope="module")
@@ -219,7 +217,7 @@ def test_nothing_to_save_says_why(damaged, content) -> None:
     assert result.reasons
 
 
-def test_wrong_paths_are_refused(log, tmp_path) -> None:
+def test_wrong_paths_are_rejected(log, tmp_path) -> None:
     path, _, spans = log
     with pytest.raises(ConfigurationError, match="no such bag"):
         recover(tmp_path / "none", tmp_path / "saved")

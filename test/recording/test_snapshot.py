@@ -1,9 +1,9 @@
 from pathlib import Path
 
-from formation_gnc.interface import NANOSECONDS
 from formation_gnc.recording import Bag
 from formation_gnc.recording.snapshot import Snapshot
 from formation_gnc.recording.writer import BagWriter
+from formation_gnc.types import NANOSECONDS
 
 
 def test_a_trigger_writes_the_last_stretch_and_each_a_file_of_its_own(tmp_path, flight) -> None:

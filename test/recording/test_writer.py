@@ -213,12 +213,12 @@ def test_a_directory_that_cannot_be_made_is_named(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("split", [{"max_bytes": 0}, {"max_duration": -1.0}, {"max_duration": float("nan")}])
-def test_a_split_that_cannot_be_kept_is_refused(split) -> None:
+def test_a_split_that_cannot_be_kept_is_rejected(split) -> None:
     with pytest.raises(ConfigurationError, match=next(iter(split))):
         Split(**split)
 
 
-def test_wrong_use_is_refused_and_harms_nothing(tmp_path, flight) -> None:
+def test_wrong_use_is_rejected_and_harms_nothing(tmp_path, flight) -> None:
     writer = BagWriter(tmp_path / "run", {})
     writer.add_topic("/clock", "rosgraph_msgs/msg/Clock", depth=10)
     with pytest.raises(ConfigurationError, match="/clock"):

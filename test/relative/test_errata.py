@@ -90,9 +90,7 @@ def test_joshi_3_48_sign_and_the_factor_two():
     _, chief, _ = differential_oblateness(ORBIT, STATE)
     truth = hill_rotation(chief) @ (gravity(chief[:3]) + MU * chief[:3] / np.linalg.norm(chief[:3]) ** 3)
     strength = 1.5 * MU * EARTH_RADIUS**2 * J2
-    np.testing.assert_allclose(
-        -strength * printed_components(chief, doubled=True), truth, rtol=1e-8, atol=1e-12
-    )
+    np.testing.assert_allclose(-strength * printed_components(chief, doubled=True), truth, rtol=1e-8, atol=1e-12)
     assert not np.allclose(-strength * printed_components(chief, doubled=False), truth, rtol=0.1, atol=1e-12)
 
 
@@ -131,9 +129,7 @@ def test_joshi_4_17_lacks_the_rate():
     assert rate[1] == approx(-2 * rho * w * math.sin(p) - 1.5 * w * a, rel=1e-6)  # (4.18) is right
     assert rate[2] == approx(m * rho * w * math.cos(p) - 2 * n * rho * w * math.sin(p), rel=1e-6)
     # With omega in (4.17) the formation is a free motion of Hill's equations.
-    start, later = (
-        np.concatenate((formation(s), (formation(s + 0.1) - formation(s - 0.1)) / 0.2)) for s in (0, 900.0)
-    )
+    start, later = (np.concatenate((formation(s), (formation(s + 0.1) - formation(s - 0.1)) / 0.2)) for s in (0, 900.0))
     np.testing.assert_allclose(HillModel(w).propagate(0.0, start, 900.0)[:3], later[:3], atol=1e-4)
 
 
@@ -404,9 +400,7 @@ def test_neokleous_1_11_is_right():
 
 def test_neokleous_2_18_c_has_no_mu_and_belongs_into_both_rows():
     reference = CircularReference(42164e3, 0.0)
-    c2 = 1 + 3 * J2 * EARTH_RADIUS**2 / (8 * reference.radius**2) * (
-        1 + 3 * math.cos(2 * reference.inclination)
-    )
+    c2 = 1 + 3 * J2 * EARTH_RADIUS**2 / (8 * reference.radius**2) * (1 + 3 * math.cos(2 * reference.inclination))
     assert math.sqrt(c2) * reference.mean_motion == approx(reference.rate, rel=1e-12)
     assert 3 * J2 * MU * EARTH_RADIUS**2 / (8 * reference.radius**2) > 1e9  # with mu: not even a number
     # Coriolis terms do no work: the velocity block of A must be skew, which 2nc above and -2n below is not.
@@ -443,9 +437,7 @@ def test_owis_3_7_factorisation():
     r, theta, rate_r, rate = 1.1, 0.8, 0.05, 0.9
     state = np.array([r, theta, rate_r, rate])
     truth = np.array([rate_r, rate, r * rate**2 - 1 / r**2, -2 * rate_r * rate / r])
-    corrected = np.array(
-        [[0, 0, 1, 0], [0, 0, 0, 1], [rate**2, -1 / (r**2 * theta), 0, 0], [0, 0, -2 * rate / r, 0]]
-    )
+    corrected = np.array([[0, 0, 1, 0], [0, 0, 0, 1], [rate**2, -1 / (r**2 * theta), 0, 0], [0, 0, -2 * rate / r, 0]])
     np.testing.assert_allclose(corrected @ state, truth, rtol=1e-12)
     printed = corrected.copy()
     printed[3] = [-2 * rate / r**2, 0, 0, 0]

@@ -52,9 +52,7 @@ def test_sdc1_is_the_nonlinear_equation(chief, time, state):
     here = chief.at(time)
     expected = printed(state, here, here.angular_acceleration)
     # The printed form subtracts two terms of MU / r^2: that rounding is the tolerance.
-    np.testing.assert_allclose(
-        sdc1(state, here) @ state, expected, rtol=1e-13, atol=4e-15 * MU / here.radius**2
-    )
+    np.testing.assert_allclose(sdc1(state, here) @ state, expected, rtol=1e-13, atol=4e-15 * MU / here.radius**2)
 
 
 @given(chiefs, times, states)

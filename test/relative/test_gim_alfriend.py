@@ -136,14 +136,12 @@ def test_gravity_of_a_smaller_oblateness_leaves_the_two_body_problem():
     for axis in (4e7, 8e7):
         elements = Elements(axis, 0.2, 1.0, 0.3, 0.4, 0.5)
         ours = scaled(elements, GimAlfriendModel(elements).transition(0.0, elements.period))
-        other = scaled(
-            elements, TschaunerHempelModel(KeplerChief.of(elements)).transition(0.0, elements.period)
-        )
+        other = scaled(elements, TschaunerHempelModel(KeplerChief.of(elements)).transition(0.0, elements.period))
         differences.append(np.abs(ours - other).max())
     assert differences[0] / differences[1] == pytest.approx(4.0, rel=0.05)
 
 
-def test_equatorial_chief_is_refused_by_name():
+def test_equatorial_chief_is_rejected_by_name():
     with pytest.raises(ConfigurationError, match="inclination"):
         GimAlfriendModel(Elements(4.2e7, 0.0, 0.0, 0.0, 0.0, 0.0))
 

@@ -26,9 +26,7 @@ def test_transition_and_forcing_are_the_matrix_exponential(mean_motion, angle, l
     # The exponential's own error over four orbits, relative to its largest entry.
     tolerance = 1e-11 * np.abs(expected).max()
     np.testing.assert_allclose(free * unit / unit[:, None], expected[:6, :6], rtol=0.0, atol=tolerance)
-    np.testing.assert_allclose(
-        forced * mean_motion**2 / unit[:, None], expected[:6, 6:], rtol=0.0, atol=tolerance
-    )
+    np.testing.assert_allclose(forced * mean_motion**2 / unit[:, None], expected[:6, 6:], rtol=0.0, atol=tolerance)
 
 
 @given(motions, durations, durations)
@@ -80,18 +78,11 @@ def test_closed_form_is_the_one_printed_with_constant_thrust():
     gx, gy, gz = 3e-5, -2e-5, 4e-5
     s, c = np.sin(omega * t), np.cos(omega * t)
     x = (4 * dx0 / omega - 6 * z0) * s - 2 * dz0 / omega * c + (6 * omega * z0 - 3 * dx0) * t
-    x += (
-        x0
-        + 2 * dz0 / omega
-        + gz * 2 / omega**2 * (omega * t - s)
-        + gx * (4 / omega**2 * (1 - c) - 1.5 * t**2)
-    )
+    x += x0 + 2 * dz0 / omega + gz * 2 / omega**2 * (omega * t - s) + gx * (4 / omega**2 * (1 - c) - 1.5 * t**2)
     y = y0 * c + dy0 / omega * s + gy / omega**2 * (1 - c)
     z = (2 * dx0 / omega - 3 * z0) * c + dz0 / omega * s + 4 * z0 - 2 * dx0 / omega
     z += gx * 2 / omega**2 * (s - omega * t) + gz / omega**2 * (1 - c)
-    ours = HillModel(omega).propagate(
-        0.0, np.array([-z0, x0, -y0, -dz0, dx0, -dy0]), t, np.array([-gz, gx, -gy])
-    )
+    ours = HillModel(omega).propagate(0.0, np.array([-z0, x0, -y0, -dz0, dx0, -dy0]), t, np.array([-gz, gx, -gy]))
     np.testing.assert_allclose(ours[:3], [-z, x, -y], rtol=1e-12)
 
 
@@ -102,9 +93,7 @@ def test_arrays_of_durations_and_states_give_the_single_results():
     thrust = np.array([1e-4, 2e-4, -1e-4])
     together = model.propagate(0.0, states, times, thrust)
     for index, time in enumerate(times):
-        np.testing.assert_array_equal(
-            together[index], model.propagate(0.0, states[index], float(time), thrust)
-        )
+        np.testing.assert_array_equal(together[index], model.propagate(0.0, states[index], float(time), thrust))
 
 
 def test_integration_of_the_right_hand_side_gives_the_closed_form():
@@ -117,6 +106,6 @@ def test_integration_of_the_right_hand_side_gives_the_closed_form():
 
 
 @pytest.mark.parametrize("value", [0.0, -1e-3, np.nan, np.inf])
-def test_impossible_mean_motion_is_refused_by_name(value):
+def test_impossible_mean_motion_is_rejected_by_name(value):
     with pytest.raises(ConfigurationError, match="mean_motion"):
         HillModel(value)

@@ -14,9 +14,7 @@ from formation_gnc.relative.j2_gradient import J2GradientModel, circular_gradien
 from formation_gnc.relative.oblate import oblate_gradient
 from formation_gnc.relative.schweighart_sedwick import CircularReference, SchweighartSedwickModel
 
-references = st.builds(
-    CircularReference, st.floats(6.6e6, 4.2e7), st.floats(0.0, math.pi), st.floats(0.0, 6.28)
-)
+references = st.builds(CircularReference, st.floats(6.6e6, 4.2e7), st.floats(0.0, math.pi), st.floats(0.0, 6.28))
 latitudes = st.floats(-10.0, 10.0)
 
 
@@ -25,9 +23,7 @@ def test_gradient_is_that_of_j2_in_the_hill_frame(reference, latitude):
     # Roberts (12) prints it for curvilinear axes; the gradient of a vector field is the same in both.
     chief = ChiefState(MU, reference.radius, 0.0, 0.0, pole_in_hill_frame(reference.inclination, latitude))
     expected = oblate_gradient(np.zeros(6), chief) / reference.mean_motion**2
-    np.testing.assert_allclose(
-        circular_gradient(reference, latitude), expected, atol=1e-12 * reference.oblateness
-    )
+    np.testing.assert_allclose(circular_gradient(reference, latitude), expected, atol=1e-12 * reference.oblateness)
 
 
 @given(st.floats(6.6e6, 4.2e7), st.floats(0.0, math.pi), st.floats(0.0, 6.28))
@@ -48,9 +44,7 @@ def test_gradient_is_the_derivative_of_the_acceleration(radius, inclination, lat
     ]
     reference = CircularReference(radius, inclination)
     expected = np.array(columns).T / reference.mean_motion**2
-    np.testing.assert_allclose(
-        circular_gradient(reference, latitude), expected, atol=1e-5 * reference.oblateness
-    )
+    np.testing.assert_allclose(circular_gradient(reference, latitude), expected, atol=1e-5 * reference.oblateness)
 
 
 @given(references, latitudes)

@@ -52,9 +52,7 @@ def test_motion_is_the_difference_of_two_inertial_orbits(elements, state):
     # Differences of inertial states carry the integrator's 1e-13 of the orbit's size, times its growth.
     size = elements.semi_major_axis
     np.testing.assert_allclose(ours[:3], expected[:3], atol=3e-11 * size)
-    np.testing.assert_allclose(
-        ours[3:], expected[3:], atol=3e-11 * size * hill_rate(chief) / (1.0 - 0.6) ** 2
-    )
+    np.testing.assert_allclose(ours[3:], expected[3:], atol=3e-11 * size * hill_rate(chief) / (1.0 - 0.6) ** 2)
 
 
 @given(orbits, states, st.floats(0.0, 1e5))
@@ -114,6 +112,6 @@ def test_whole_arrays_of_states_move_as_single_ones():
         ({"semi_major_axis": 7e6, "true_anomaly": math.inf}, "true_anomaly"),
     ],
 )
-def test_impossible_chief_is_refused_by_name(values, name):
+def test_impossible_chief_is_rejected_by_name(values, name):
     with pytest.raises(ConfigurationError, match=name):
         KeplerChief(**values)

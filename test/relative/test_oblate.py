@@ -107,9 +107,7 @@ def test_chief_moves_as_scipy_moves_it():
     chief = OblateChief(elements)
     for time in (-3000.0, 20000.0):
         expected = inertial(state_from_elements(elements), time)
-        np.testing.assert_allclose(
-            chief.inertial(time)[:3], expected[:3], atol=1e-3
-        )  # 1e-13 for three orbits
+        np.testing.assert_allclose(chief.inertial(time)[:3], expected[:3], atol=1e-3)  # 1e-13 for three orbits
 
 
 @pytest.mark.parametrize("inclination", [0.0, 0.3, 1.7, math.pi])

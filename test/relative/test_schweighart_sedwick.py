@@ -22,9 +22,7 @@ from formation_gnc.relative.schweighart_sedwick import (
     SchweighartSedwickNodalModel,
 )
 
-references = st.builds(
-    CircularReference, st.floats(6.6e6, 4.2e7), st.floats(0.0, math.pi), st.floats(0.0, 6.28)
-)
+references = st.builds(CircularReference, st.floats(6.6e6, 4.2e7), st.floats(0.0, math.pi), st.floats(0.0, 6.28))
 numbers = st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6)
 
 
@@ -44,9 +42,7 @@ def test_state_matrix_is_the_average_of_the_gradient(reference):
                 lambda u, r=row, k=column: circular_gradient(reference, u)[r, k], 0.0, math.tau
             )[0]
     average /= math.tau
-    expected = (
-        np.diag([2.0, -1.0, -1.0]) + average + np.diag([c2, c2, 0.0])
-    )  # gravity and the frame's turning
+    expected = np.diag([2.0, -1.0, -1.0]) + average + np.diag([c2, c2, 0.0])  # gravity and the frame's turning
     matrix = SchweighartSedwickModel(reference).dynamics()
     np.testing.assert_allclose(matrix[3:, :3] / n**2, expected, atol=1e-12)
     # Roberts (24)
@@ -131,9 +127,7 @@ def test_on_the_equator_a_perturbed_satellite_keeps_about_the_reference(radius, 
         return result
 
     turn = math.pi / k
-    solution = solve_ivp(
-        rate, (0.0, 40 * turn), state, method="DOP853", rtol=1e-11, atol=1e-9, dense_output=True
-    )
+    solution = solve_ivp(rate, (0.0, 40 * turn), state, method="DOP853", rtol=1e-11, atol=1e-9, dense_output=True)
     means = [
         np.mean(solution.sol(start * turn + np.linspace(0.0, 4 * turn, 400, endpoint=False))[:2], axis=1)
         for start in (0, 36)
@@ -158,9 +152,7 @@ def schweighart_sedwick_constants(reference, state):
     gamma = math.atan2(1.0, across)
     angle = math.acos(math.cos(i) * math.cos(i2) + math.sin(i) * math.sin(i2) * math.cos(node))
     q = reference.rate - drift * math.cos(i)
-    q -= (math.cos(gamma) * math.sin(gamma) / math.tan(node) - math.sin(gamma) ** 2 * math.cos(i)) * (
-        drift - drift2
-    )
+    q -= (math.cos(gamma) * math.sin(gamma) / math.tan(node) - math.sin(gamma) ** 2 * math.cos(i)) * (drift - drift2)
     growth = -r * math.sin(i) * math.sin(i2) * math.sin(node) / math.sin(angle) * (drift - drift2)
     return q, growth
 
@@ -213,9 +205,7 @@ def test_without_oblateness_it_would_be_hills_model():
     differences = []
     for radius in (4e7, 8e7):
         reference = CircularReference(radius, 0.4)
-        ours = scaled(
-            reference, SchweighartSedwickNodalModel(reference).transition(0.0, 1e4 * (radius / 4e7) ** 1.5)
-        )
+        ours = scaled(reference, SchweighartSedwickNodalModel(reference).transition(0.0, 1e4 * (radius / 4e7) ** 1.5))
         hill = HillModel(reference.mean_motion).transition(0.0, 1e4 * (radius / 4e7) ** 1.5)
         differences.append(np.abs(ours - scaled(reference, hill)).max())
     assert differences[0] / differences[1] == pytest.approx(4.0, rel=1e-3)
@@ -229,6 +219,6 @@ def test_cross_track_extension_has_no_singular_inclination_or_state(inclination)
 
 
 @pytest.mark.parametrize(("radius", "inclination"), [(6e6, 1.0), (math.nan, 1.0), (7e6, math.inf)])
-def test_impossible_reference_is_refused_by_name(radius, inclination):
+def test_impossible_reference_is_rejected_by_name(radius, inclination):
     with pytest.raises(ConfigurationError, match=r"radius|inclination"):
         CircularReference(radius, inclination)

@@ -13,9 +13,7 @@ from formation_gnc.relative.model import LinearModel, RelativeModel
 from formation_gnc.relative.tschauner_hempel import TschaunerHempelModel
 
 models = st.builds(
-    lambda perigee, e, anomaly: TschaunerHempelModel(
-        KeplerChief(perigee / (1.0 - e), e, true_anomaly=anomaly)
-    ),
+    lambda perigee, e, anomaly: TschaunerHempelModel(KeplerChief(perigee / (1.0 - e), e, true_anomaly=anomaly)),
     st.floats(6.6e6, 4.2e7),
     st.floats(0.0, 0.8),
     st.floats(0.0, 6.28),
@@ -55,18 +53,12 @@ def test_transition_is_symplectic(model, start, turns):
         w = model.chief.at(time).angular_rate
         cross = np.array([[0.0, -w, 0.0], [w, 0.0, 0.0], [0.0, 0.0, 0.0]])
         to_momenta = np.block([[np.eye(3), np.zeros((3, 3))], [cross, np.eye(3)]])
-        return (
-            to_momenta.T
-            @ np.block([[np.zeros((3, 3)), np.eye(3)], [-np.eye(3), np.zeros((3, 3))]])
-            @ to_momenta
-        )
+        return to_momenta.T @ np.block([[np.zeros((3, 3)), np.eye(3)], [-np.eye(3), np.zeros((3, 3))]]) @ to_momenta
 
     time, duration = start * model.period, turns * model.period
     phi = model.transition(time, duration)
     unit = np.repeat([1.0, model.chief.mean_motion], 3)
-    residual = (
-        (phi.T @ form(time + duration) @ phi - form(time)) * np.outer(unit, unit) / model.chief.mean_motion
-    )
+    residual = (phi.T @ form(time + duration) @ phi - form(time)) * np.outer(unit, unit) / model.chief.mean_motion
     np.testing.assert_allclose(residual, 0.0, atol=1e-11 * np.abs(scaled(model, phi)).max() ** 2)
 
 
@@ -94,9 +86,7 @@ def test_bounded_motion_closes_after_one_revolution(model, start, numbers):
 def test_bounded_condition_is_the_one_every_model_shares():
     model = TschaunerHempelModel(KeplerChief(9e6, 0.3, true_anomaly=1.0))
     state = np.array([100.0, 200.0, -50.0, 0.1, -0.2, 0.05])
-    np.testing.assert_allclose(
-        model.bounded(77.0, state), RelativeModel.bounded(model, 77.0, state), rtol=1e-10
-    )
+    np.testing.assert_allclose(model.bounded(77.0, state), RelativeModel.bounded(model, 77.0, state), rtol=1e-10)
 
 
 def test_bounded_rate_at_the_perigee_is_the_known_one():

@@ -20,9 +20,9 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.nodes.launcher import executable
 from formation_gnc.recording import Bag
 from formation_gnc.sil.scenario import find_scenario
+from formation_gnc.transport.launcher import executable
 
 GNC_TOPICS = (
     "/clock",
@@ -120,9 +120,7 @@ class Desk:
     def take_off(self) -> tuple[Terminal, dict[str, Terminal]]:
         """A flight that is recorded to `bag` and goes on while nodes are killed: the plant and the parts."""
         self.start("recorder", bag=self.directory / "bag")
-        plant = self.start(
-            "plant", duration=900.0, real_time_factor=100.0, deadline=0.5, wait_for_recorder=True
-        )
+        plant = self.start("plant", duration=900.0, real_time_factor=100.0, deadline=0.5, wait_for_recorder=True)
         terminals = {kind: self.start(kind) for kind in PARTS}
         wait_until(lambda: "acquired" in terminals["navigation"].text, "the first estimate")
         return plant, terminals

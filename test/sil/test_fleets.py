@@ -10,11 +10,11 @@ import yaml
 from formation_gnc.analysis.compare import gnc_topics
 from formation_gnc.analysis.separation import minimum_separation
 from formation_gnc.cli import main
-from formation_gnc.interface import Event, Truth
-from formation_gnc.nodes.launcher import Report, fly_graph
 from formation_gnc.recording.reader import Bag, identical
+from formation_gnc.records import Event, Truth
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import find_scenario, load_scenario
+from formation_gnc.transport.launcher import Report, fly_graph
 
 from .conftest import Sil, set_parameter
 
@@ -39,9 +39,7 @@ def test_all_arrive_and_none_comes_near_another(scenario: str, tick: float) -> N
 
     run.fly(sink)
     assert run.misses == 0
-    positions = np.array([[d.relative_state[:3] for d in truth.deputies] for truth in truths]).transpose(
-        1, 0, 2
-    )
+    positions = np.array([[d.relative_state[:3] for d in truth.deputies] for truth in truths]).transpose(1, 0, 2)
     for index, aims in enumerate(targets.values()):
         off = np.linalg.norm(positions[index] - np.array(aims)[:, :3], axis=1)
         assert off[round((CHANGE + 10) / tick)] > 500.0
@@ -141,9 +139,7 @@ def test_a_fleet_in_flight_is_told_of_another_formation_and_changes_at_one_tick(
 
 
 @pytest.mark.sil
-def test_eight_fly_composed_to_the_bits_of_the_runner_without_a_miss(
-    sil: Callable[..., Sil], tmp_path: Path
-) -> None:
+def test_eight_fly_composed_to_the_bits_of_the_runner_without_a_miss(sil: Callable[..., Sil], tmp_path: Path) -> None:
     bags = []
     for way in ("--composed", "--in-process"):
         run = sil("--duration", "60", way, directory=tmp_path / way.strip("-"), scenario="projected_circle")
@@ -160,9 +156,7 @@ def test_eight_fly_composed_to_the_bits_of_the_runner_without_a_miss(
 
 @pytest.mark.sil
 def test_the_display_draws_the_fleet_while_it_flies(sil: Callable[..., Sil]) -> None:
-    run = sil(
-        "--composed", "--display", "--duration", "900", "--real-time-factor", "200", scenario="tetrahedral"
-    )
+    run = sil("--composed", "--display", "--duration", "900", "--real-time-factor", "200", scenario="tetrahedral")
     status, _, errors = run.finish()
     assert status == 0, errors
     drawn = Bag(run.bag)

@@ -50,8 +50,8 @@ def test_nodes_started_by_hand_in_any_order_fly_and_swap_the_law_in_flight(desk:
     time.sleep(1.0)
     accepted, reason = set_parameter(desk.domain, "/deputy1/controller", "algorithm", "coast")
     assert accepted, reason
-    refused, reason = set_parameter(desk.domain, "/deputy1/controller", "algorithm", "magic")
-    assert not refused
+    rejected, reason = set_parameter(desk.domain, "/deputy1/controller", "algorithm", "magic")
+    assert not rejected
     assert "magic" in reason
     assert "coast, " in reason, "the reason says what is allowed"
     assert terminals["plant"].wait() == 0
@@ -77,18 +77,14 @@ def test_nodes_started_by_hand_in_any_order_fly_and_swap_the_law_in_flight(desk:
 @pytest.fixture
 def load() -> Iterator[None]:
     """Every core busy with something else."""
-    burners = [
-        subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(os.cpu_count() or 1)
-    ]
+    burners = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(os.cpu_count() or 1)]
     yield
     for burner in burners:
         burner.kill()
         burner.wait()
 
 
-def test_two_rounds_of_laws_under_load_miss_no_tick_and_step_no_further_than_the_bound(
-    desk: Desk, load: None
-) -> None:
+def test_two_rounds_of_laws_under_load_miss_no_tick_and_step_no_further_than_the_bound(desk: Desk, load: None) -> None:
     bag = desk.directory / "bag"
     desk.start("recorder", bag=bag)
     plant = desk.start("plant", duration=10_000.0, real_time_factor=100.0, wait_for_recorder=True)
@@ -112,9 +108,7 @@ def test_two_rounds_of_laws_under_load_miss_no_tick_and_step_no_further_than_the
     assert np.array_equal(thrust["stamp_ns"], np.arange(ticks) * 1_000_000_000)
     assert ticks >= recorded.topics["/truth"].count - 1, "the plant may be stopped within a tick"
     handovers = events(bag, "handover")
-    assert [detail.split(":")[0] for _, detail in handovers] == [
-        f"{old} -> {new}" for old, new in pairwise(laws)
-    ]
+    assert [detail.split(":")[0] for _, detail in handovers] == [f"{old} -> {new}" for old, new in pairwise(laws)]
     at = [tick for tick, _ in handovers]
     assert list(status["algorithm"]) == [
         law for law, begin, end in zip(laws, [0, *at], [*at, ticks], strict=True) for _ in range(begin, end)
@@ -312,20 +306,18 @@ def test_the_nodes_end_when_the_command_is_killed(sil: StartSil) -> None:
         ("recorder", {"bag": "/proc"}, "/proc"),
     ],
 )
-def test_a_node_refuses_a_wrong_parameter_in_one_line_with_status_2(
+def test_a_node_rejects_a_wrong_parameter_in_one_line_with_status_2(
     desk: Desk, kind: str, parameter: dict[str, object], said: str
 ) -> None:
     terminal = desk.start(kind, **parameter)
     assert terminal.wait() == 2
     # `ros2 run` adds a line of its own
-    (line,) = [
-        line for line in terminal.text.splitlines() if line.strip() and not line.startswith("[ros2run]")
-    ]
+    (line,) = [line for line in terminal.text.splitlines() if line.strip() and not line.startswith("[ros2run]")]
     assert line.startswith(f"{kind}: ")
     assert said in line
 
 
-def test_a_node_refuses_an_unreadable_parameter_file(desk: Desk) -> None:
+def test_a_node_rejects_an_unreadable_parameter_file(desk: Desk) -> None:
     desk.parameters = desk.directory / "missing.yaml"
     terminal = desk.start("guidance")
     assert terminal.wait() == 2

@@ -22,12 +22,12 @@ from rosbags.rosbag2 import Reader
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
-from formation_gnc.interface import NANOSECONDS
-from formation_gnc.nodes import topics
 from formation_gnc.recording import Bag
 from formation_gnc.recording.layout import LAYOUT
 from formation_gnc.recording.provenance import LOST
 from formation_gnc.recording.recover import PARTLY_LOST, recover
+from formation_gnc.transport import topics
+from formation_gnc.types import NANOSECONDS
 
 from .conftest import GNC_TOPICS, PARTS, PATIENCE, Desk, Sil, Terminal, wait_until
 
@@ -127,9 +127,7 @@ def test_a_recorder_reports_the_end_of_the_flight(desk: Desk) -> None:
 def test_the_plant_stays_until_a_recorder_has_its_end(desk: Desk) -> None:
     with user(desk) as (node, executor):
         told: list[str] = []
-        node.create_subscription(
-            Event, topics.EVENTS, lambda event: told.append(event.kind), topics.quality()
-        )
+        node.create_subscription(Event, topics.EVENTS, lambda event: told.append(event.kind), topics.quality())
         publisher = node.create_publisher(Clock, topics.RECORDED, topics.quality(topics.LATEST))
 
         def record_up_to(stamp: int) -> None:
@@ -161,7 +159,7 @@ import rclpy
 from formation_gnc_msgs import msg
 from rosgraph_msgs.msg import Clock
 
-from formation_gnc.nodes import topics
+from formation_gnc.transport import topics
 from formation_gnc.nodes.recorder import RecorderNode
 
 rclpy.init(args=sys.argv)
@@ -251,7 +249,7 @@ import time
 import rclpy
 from formation_gnc_msgs.msg import Event
 
-from formation_gnc.nodes import shell, topics
+from formation_gnc.transport import node as shell, topics
 from formation_gnc.nodes.recorder import QUIET, RecorderNode, record
 
 rclpy.init(args=sys.argv)
@@ -313,9 +311,7 @@ def test_a_full_disk_ends_the_run_with_a_reason_and_saves_what_was_written(desk:
 
 
 PACE = 200.0  # simulated s per wall s
-MOMENTS = [
-    pytest.param(number, marks=[pytest.mark.slow] * (number > 1), id=str(number)) for number in range(20)
-]
+MOMENTS = [pytest.param(number, marks=[pytest.mark.slow] * (number > 1), id=str(number)) for number in range(20)]
 
 
 @pytest.mark.parametrize("everything", [False, True], ids=["recorder", "everything"])

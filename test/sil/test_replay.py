@@ -81,9 +81,7 @@ def call(user: Any, executor: SingleThreadedExecutor, kind: Any, service: str, r
     return answer.result()
 
 
-def test_the_replay_node_plays_in_step_with_real_nodes_to_the_same_bits(
-    desk: Desk, sil: Callable[..., Sil]
-) -> None:
+def test_the_replay_node_plays_in_step_with_real_nodes_to_the_same_bits(desk: Desk, sil: Callable[..., Sil]) -> None:
     run = sil("--duration", "200", "--in-process")
     assert run.finish()[0] == 0
     bag = desk.directory / "again"
@@ -104,12 +102,8 @@ def test_the_replay_node_plays_in_step_with_real_nodes_to_the_same_bits(
         step = call(user, executor, Trigger, "/replay/step", Trigger.Request())
         assert step.success
         assert step.message == "played 0 s"
-        wait_until(
-            lambda: all(has_messages(bag, topic) for topic in GNC_TOPICS), "everybody joined to the recorder"
-        )
-        assert (
-            call(user, executor, SetBool, "/replay/pause", SetBool.Request(data=False)).message == "playing"
-        )
+        wait_until(lambda: all(has_messages(bag, topic) for topic in GNC_TOPICS), "everybody joined to the recorder")
+        assert call(user, executor, SetBool, "/replay/pause", SetBool.Request(data=False)).message == "playing"
     finally:
         user.destroy_node()
         rclpy.shutdown(context=context)
@@ -128,9 +122,7 @@ def test_the_replay_node_plays_in_step_with_real_nodes_to_the_same_bits(
         ({"bag": ".", "start": 5.0, "end": 5.0}, "parameter end: 5.0 is not allowed; it must be above start"),
     ],
 )
-def test_the_replay_node_refuses_what_it_cannot_play(
-    desk: Desk, parameters: dict[str, object], said: str
-) -> None:
+def test_the_replay_node_rejects_what_it_cannot_play(desk: Desk, parameters: dict[str, object], said: str) -> None:
     terminal = desk.start("replay", **parameters)
     assert terminal.wait() == 2
     (line,) = [line for line in terminal.text.splitlines() if line.strip()]

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from formation_gnc.interface import NANOSECONDS
-from formation_gnc.nodes.conversion import to_cdr
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
+from formation_gnc.transport.conversion import to_cdr
+from formation_gnc.types import NANOSECONDS
 
 Array = NDArray[np.float64]
 Records = dict[str, list[Any]]
@@ -127,7 +127,7 @@ def test_every_topic_has_one_record_for_every_tick(flight: Records) -> None:
 def test_the_run_ends_with_what_it_flew_and_no_miss(flight: Records) -> None:
     *_, end = flight["/events"]
     assert (end.kind, end.node, end.detail) == ("end", "/plant", "17403 ticks flown, 0 missed")
-    assert not [event for event in flight["/events"] if event.kind in ("miss", "refused", "fallback")]
+    assert not [event for event in flight["/events"] if event.kind in ("miss", "rejected", "fallback")]
 
 
 def test_nothing_in_the_flight_is_not_finite(flight: Records) -> None:
@@ -236,9 +236,7 @@ def test_mpc_gives_no_thrust_in_an_eclipse_that_guidance_foresees() -> None:
 
 
 @pytest.mark.parametrize(("radius", "least", "most"), [(0.0, 30.0, 45.0), (60.0, 58.0, 70.0)])
-def test_mpc_keeps_out_of_the_way_of_the_others_of_its_fleet(
-    radius: float, least: float, most: float
-) -> None:
+def test_mpc_keeps_out_of_the_way_of_the_others_of_its_fleet(radius: float, least: float, most: float) -> None:
     # They start 10 m from one another's places, and change over.
     scenario: Overrides = {
         "/**": {"tick": 10.0},

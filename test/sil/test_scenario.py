@@ -132,24 +132,18 @@ def test_a_written_scenario_gives_every_node_all_its_parameters_through_ros(
     path.write_text(scenario.text({"/plant": {"wait_for_recorder": True}, "/recorder": {"bag": "here"}}))
     for node, values in scenario.parameters().items():
         extra = {"wait_for_recorder": True} if node == "/plant" else {}
-        plain = {
-            name: list(each) if isinstance(each, tuple) else each for name, each in values.items()
-        } | extra
+        plain = {name: list(each) if isinstance(each, tuple) else each for name, each in values.items()} | extra
         given = {
             name: each if isinstance(each, bool | int | float | str) else list(each)
             for name, each in by_ros(node, path).items()
         }
         assert given == {name: each for name, each in plain.items() if each != []}
-        assert {name: type(each) for name, each in given.items()} == {
-            name: type(plain[name]) for name in given
-        }
+        assert {name: type(each) for name, each in given.items()} == {name: type(plain[name]) for name in given}
     assert by_ros("/recorder", path) == {"bag": "here"}
 
 
 def test_a_scenario_written_and_read_again_is_the_same(tmp_path: Path) -> None:
-    scenario = load_scenario(
-        "leader_follower", {"/**/controller": {"schedule": ["{at: 5.0, algorithm: coast}"]}}
-    )
+    scenario = load_scenario("leader_follower", {"/**/controller": {"schedule": ["{at: 5.0, algorithm: coast}"]}})
     (tmp_path / "leader_follower.yaml").write_text(scenario.text())
     assert load_scenario(str(tmp_path / "leader_follower.yaml")) == scenario
 
@@ -171,9 +165,7 @@ def test_namespaces_may_be_nested_and_parameters_too(write: Write) -> None:
 
 
 def test_overrides_go_before_the_file() -> None:
-    scenario = load_scenario(
-        "leader_follower", {"/plant": {"seed": 9}, "/**/controller": {"algorithm": "coast"}}
-    )
+    scenario = load_scenario("leader_follower", {"/plant": {"seed": 9}, "/**/controller": {"algorithm": "coast"}})
     assert (scenario.plant.seed, scenario.deputies["deputy1"].controller.algorithm) == (9, "coast")
 
 
@@ -236,10 +228,10 @@ def test_the_good_file_that_the_bad_ones_are_made_from_is_good(write: Write) -> 
 )
 def test_what_a_file_has_wrong_is_named(old: str, new: str, words: str, write: Write) -> None:
     assert old in GOOD
-    with pytest.raises(ConfigurationError) as refusal:
+    with pytest.raises(ConfigurationError) as rejection:
         load_scenario(str(write(GOOD.replace(old, new))))
-    assert words in str(refusal.value)
-    assert "scenario.yaml: " in str(refusal.value)
+    assert words in str(rejection.value)
+    assert "scenario.yaml: " in str(rejection.value)
 
 
 @pytest.mark.parametrize("text", ["", "3", "- a\n- b\n", "word"])
@@ -259,10 +251,10 @@ def test_a_file_that_cannot_be_read_says_why(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["nowhere", "", "leader follower"])
 def test_an_unknown_name_is_answered_with_those_that_are_known(name: str) -> None:
-    with pytest.raises(ConfigurationError) as refusal:
+    with pytest.raises(ConfigurationError) as rejection:
         load_scenario(name)
-    assert str(refusal.value).startswith(f"scenario {name}: unknown; it must be a parameter file or one of ")
-    assert "leader_follower" in str(refusal.value)
+    assert str(rejection.value).startswith(f"scenario {name}: unknown; it must be a parameter file or one of ")
+    assert "leader_follower" in str(rejection.value)
 
 
 @pytest.mark.parametrize("name", ["nowhere.yaml", "./nowhere", "/", "nowhere.yml"])
@@ -286,7 +278,7 @@ def test_a_number_of_orbits_is_flown_in_whole_ticks_and_to_the_end(orbits: float
 
 
 @pytest.mark.parametrize("orbits", [0.0, -1.0, math.nan, math.inf])
-def test_a_number_of_orbits_that_cannot_be_flown_is_refused(orbits: float) -> None:
-    with pytest.raises(ConfigurationError) as refusal:
+def test_a_number_of_orbits_that_cannot_be_flown_is_rejected(orbits: float) -> None:
+    with pytest.raises(ConfigurationError) as rejection:
         duration_of(orbits, load_scenario("leader_follower"))
-    assert str(refusal.value) == f"orbits: {orbits!r} is not allowed; it must be above 0 and finite"
+    assert str(rejection.value) == f"orbits: {orbits!r} is not allowed; it must be above 0 and finite"

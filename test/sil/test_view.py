@@ -81,8 +81,7 @@ class Viewer:
                     assert (channel["encoding"], channel["schemaEncoding"]) == ("cdr", "ros2msg")
                     kinds[number] = MessageType(channel["schemaName"], channel["schema"].encode(), "ros2msg")
                 wanted = [
-                    {"id": number, "channelId": self.channels[topic]["id"]}
-                    for number, topic in enumerate(topics)
+                    {"id": number, "channelId": self.channels[topic]["id"]} for number, topic in enumerate(topics)
                 ]
                 self.say({"op": "subscribe", "subscriptions": wanted})
             elif data:
@@ -183,7 +182,7 @@ def _until(viewer: Viewer, second: int) -> Iterator[tuple[int, int, bytes]]:
         (["--layout", "/nowhere/layout.json"], "layout /nowhere/layout.json: No such file"),
     ],
 )
-def test_what_cannot_be_shown_is_refused_in_one_line(
+def test_what_cannot_be_shown_is_rejected_in_one_line(
     arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     before = signal.getsignal(signal.SIGTERM)

@@ -26,9 +26,7 @@ class Ours:
         """With none yet."""
         self.cells: list[Cell] = []
 
-    def __call__(
-        self, name: str, value: float, form: str = ".4g", unit: str = "", margin: float | None = None
-    ) -> str:
+    def __call__(self, name: str, value: float, form: str = ".4g", unit: str = "", margin: float | None = None) -> str:
         """The figure in a form; it may be off by the margin, or else by its share of `RELATIVE`."""
         before = accepted().get(name, float("nan"))
         margin = RELATIVE * abs(before) if margin is None else margin
@@ -53,7 +51,7 @@ def accepted() -> dict[str, float]:
 
 
 def rows() -> list[list[str]]:
-    """Part of the page, name and value of each figure accepted last."""
+    """FlightModule of the page, name and value of each figure accepted last."""
     if not ACCEPTED.exists():
         return []
     with ACCEPTED.open() as stream:

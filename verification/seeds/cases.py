@@ -95,10 +95,7 @@ def table(heading: Sequence[str], columns: Sequence[Array | Sequence[str]]) -> s
     """Markdown of state errors: a row for each of `STATES`, a column of six figures or words each."""
     lines = ["| error, km, km/s | " + " | ".join(heading) + " |", "|---" * (len(heading) + 1) + "|"]
     for row, name in enumerate(STATES):
-        words = [
-            value if isinstance(value, str) else f"{value:.3g}"
-            for value in (column[row] for column in columns)
-        ]
+        words = [value if isinstance(value, str) else f"{value:.3g}" for value in (column[row] for column in columns)]
         lines.append(f"| {name} | " + " | ".join(words) + " |")
     return "\n".join(lines) + "\n"
 
@@ -136,7 +133,5 @@ def picture(path: Path, what: str, flights: Mapping[str, tuple[Array, Array]], g
         low, high = panel.get_ylim()
         reach = 1.4 * float(np.median(peaks))
         panel.set_ylim(max(low, -reach), min(high, reach))
-        panel.set(
-            xlabel="time, s", ylabel="m/s²", title=f"thrust along {name}, at most {peaks.max():.2g} m/s²"
-        )
+        panel.set(xlabel="time, s", ylabel="m/s²", title=f"thrust along {name}, at most {peaks.max():.2g} m/s²")
     save(plot, path)

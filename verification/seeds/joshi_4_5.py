@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import expm
 
+from formation_gnc.common import CommonParameters
+from formation_gnc.common import Orbit as Chief
 from formation_gnc.control.controller import Vehicle
 from formation_gnc.control.finite_horizon import Task
+from formation_gnc.control.fixed_endpoint_lq import state_dependent
 from formation_gnc.control.riccati import Weights, continuous_gain
 from formation_gnc.control.sdre import Sdre, SdreParameters
 from formation_gnc.control.sdre_finite import FiniteSdre, SdreFiniteParameters
-from formation_gnc.control.steering import state_dependent
-from formation_gnc.mission import Mission
-from formation_gnc.mission import Orbit as Chief
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.model import RelativeModel
 from formation_gnc.relative.oblate import OblateModel
@@ -35,7 +35,7 @@ from verification.seeds.cases import (
     table,
 )
 
-MISSION = Mission(Chief(SEMI_MAJOR_AXIS), tick=TICK)
+MISSION = CommonParameters(Chief(SEMI_MAJOR_AXIS), tick=TICK)
 HILL = HillModel(math.sqrt(MU / SEMI_MAJOR_AXIS**3))
 GAIN = continuous_gain(HILL.dynamics(0.0), HILL.INPUT, Weights.scaled(np.eye(6), 1e9 * np.eye(3), TICK))
 """Of his LQR, Q = I and R = 1e9 I."""
@@ -90,9 +90,7 @@ def lqr(directory: Path, ours: Ours) -> tuple[str, list[Figure]]:
                 [np.array(printed), circular, np.array(printed_eccentric), plain, helped, against],
             ),
             "Effort ∫|u|² dt: "
-            + ", ".join(
-                f"{name} {ours(f'4.3, {name}: effort', effort(u))}" for name, (_, u) in flights.items()
-            )
+            + ", ".join(f"{name} {ours(f'4.3, {name}: effort', effort(u))}" for name, (_, u) in flights.items())
             + " m²/s³.",
             "",
             "Circular, both are metres; the time of the table is not printed, and the error passes",
@@ -291,9 +289,7 @@ def sdre_forms(directory: Path, ours: Ours) -> tuple[str, list[Figure]]:
     ]
     return "\n".join(lines), [
         Figure("SDRE: lasting error without J2 in A(x), over that with it", "", unknown, "", 10.0, math.inf),
-        Figure(
-            "SDRE: lasting error of SDC2 with the integral, over that without", "", integrated, "", 0.0, 0.5
-        ),
+        Figure("SDRE: lasting error of SDC2 with the integral, over that without", "", integrated, "", 0.0, 0.5),
     ]
 
 
@@ -360,9 +356,7 @@ def finite(directory: Path, ours: Ours) -> tuple[str, list[Figure]]:
         *(line for each in pictures for line in (each, "")),
     ]
     return "\n".join(lines), [
-        Figure(
-            "5.6 (c): greatest position error, below 1 mm/km of way", "0.8 to 295 km", max(met), "m", 0.0, 0.1
-        )
+        Figure("5.6 (c): greatest position error, below 1 mm/km of way", "0.8 to 295 km", max(met), "m", 0.0, 0.1)
     ]
 
 

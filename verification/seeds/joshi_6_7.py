@@ -108,11 +108,7 @@ def table_6_3(directory: Path, ours: Ours) -> tuple[str, list[Figure]]:
         table(
             ["guess, printed", "guess, e = 0", "1", "2", "guess, e = 0.15", "1", "2"],
             [np.array(printed[0])]
-            + [
-                ours.state(f"6.3, e = {e:g}, iteration {k}", right[e].errors[k])
-                for e in chiefs
-                for k in range(3)
-            ],
+            + [ours.state(f"6.3, e = {e:g}, iteration {k}", right[e].errors[k]) for e in chiefs for k in range(3)],
         ),
         "Two iterations, where ten are printed. Which chief the table is of, is not said. Its columns 10",
         "and SDRE stand again in Table 6.4, of the eccentric chief, and its guess misses by the kilometres",
@@ -175,9 +171,7 @@ def figure_6_7(panel: Axes) -> float:
     plant, goal, step, misses = model(0.0), Orbit(1.5, 60.0, 1.5), 10.0, []
     for theta in np.arange(0.0, 360.0, 45.0):
         start = Orbit(0.5, theta, 1.0)
-        task = with_guess(
-            Task(plant, 0.0, start.state(0.0), goal.state(float(FINAL)), float(FINAL), int(FINAL / step))
-        )
+        task = with_guess(Task(plant, 0.0, start.state(0.0), goal.state(float(FINAL)), float(FINAL), int(FINAL / step)))
         held = mpsp(task, TIGHT, 10).acceleration
         states, _ = fly(plant, task.state, lambda time, _, u=held: u[round(time / step)], len(held), step)
         panel.plot(states[:, 1] / KM, states[:, 0] / KM)
@@ -305,8 +299,7 @@ def tables(directory: Path, ours: Ours) -> tuple[str, list[Figure]]:
             ours(f"{case.name}: iterations", plan.iterations, "d", margin=0.0)
             + " iterations. Effort ∫|u|² dt: "
             + ", ".join(
-                f"{name} {ours(f'{case.name}, {name}: effort', each, unit='m²/s³')}"
-                for name, each in spent.items()
+                f"{name} {ours(f'{case.name}, {name}: effort', each, unit='m²/s³')}" for name, each in spent.items()
             )
             + " m²/s³.",
             case.remark,
@@ -391,9 +384,7 @@ def convergence(directory: Path, ours: Ours) -> tuple[str, list[Figure]]:
     ]
     return "\n".join(lines), [
         Figure("most iterations of a plan", "10 printed", max(iterations), "", 1, 4),
-        Figure(
-            "MPSP: largest cost over the optimum, less 1", "optimal", max(excess["MPSP"]), "", 0.0, 1.5e-4
-        ),
+        Figure("MPSP: largest cost over the optimum, less 1", "optimal", max(excess["MPSP"]), "", 0.0, 1.5e-4),
         Figure(
             "G-MPSP: largest difference of cost, relative",
             "optimal",

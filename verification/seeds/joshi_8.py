@@ -204,14 +204,10 @@ def section(directory: Path) -> tuple[str, list[Figure]]:
         for axis, color in enumerate(("tab:blue", "tab:orange", "tab:green")):
             lacking.plot(missing[:, axis], color=color, lw=2.5, alpha=0.4, label=f"d along {'xyz'[axis]}")
             lacking.plot(identified[:, axis], "--", color=color, label="identified")
-        lacking.set(
-            xlabel="time, s", ylabel="m/s²", title=f"Fig. 8.2: what the model lacks, e = {eccentricity:g}"
-        )
+        lacking.set(xlabel="time, s", ylabel="m/s²", title=f"Fig. 8.2: what the model lacks, e = {eccentricity:g}")
         lacking.legend(fontsize=8)
         learning.plot(np.array(learner.weights).reshape(FINAL, -1), lw=0.7)
-        learning.set(
-            xlabel="time, s", ylabel="weight, in units of order one", title="Fig. 8.9: weights of NN2"
-        )
+        learning.set(xlabel="time, s", ylabel="weight, in units of order one", title="Fig. 8.9: weights of NN2")
     save(plot, directory / "seeds_networks.png")
     lines += [
         "The printed column LQR is open loop, as in chapters 6 and 7: in closed loop LQR alone is a",

@@ -9,18 +9,19 @@ from typing import Any
 
 import numpy as np
 
+from formation_gnc.common import CommonParameters
+from formation_gnc.common import Orbit as Chief
 from formation_gnc.control.controller import Command, Controller, Vehicle
 from formation_gnc.control.finite_horizon import PLAN_MODELS
 from formation_gnc.control.registry import ALGORITHMS, FINITE_HORIZONS
 from formation_gnc.guidance.relative_orbit import RelativeOrbit, RelativeOrbitParameters
-from formation_gnc.interface import NANOSECONDS, NOBODY, Target
-from formation_gnc.mission import Mission
-from formation_gnc.mission import Orbit as Chief
 from formation_gnc.orbit.constants import MU
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
+from formation_gnc.records import NOBODY, Target
 from formation_gnc.relative.chief import KeplerChief, OblateChief
 from formation_gnc.relative.model import NO_THRUST
+from formation_gnc.types import NANOSECONDS
 from verification.control import estimate
 from verification.figure import Figure
 from verification.optimum import Field, free_flight, optimum, regulated
@@ -66,8 +67,8 @@ def model_of(oblate: bool) -> str:
 def law_for(name: str, eccentricity: float, **own: Any) -> Controller:
     """A law with parameters of its own, on a deputy without limits."""
     kind = ALGORITHMS[name]
-    mission = Mission(Chief(SEMI_MAJOR_AXIS, eccentricity, INCLINATION), tick=TICK)
-    return kind(kind.Parameters(**own), mission, Vehicle(MASS, np.full(3, 1e9)))
+    common = CommonParameters(Chief(SEMI_MAJOR_AXIS, eccentricity, INCLINATION), tick=TICK)
+    return kind(kind.Parameters(**own), common, Vehicle(MASS, np.full(3, 1e9)))
 
 
 def planner(name: str, eccentricity: float, oblate: bool) -> Controller:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.linalg import LinAlgError
 from numpy.typing import NDArray
 
-from formation_gnc.control.steering import Cost, Sequence, System, approximating_sequence
+from formation_gnc.control.fixed_endpoint_lq import Cost, Sequence, System, approximating_sequence
 from verification.figure import Figure, save
 from verification.optimum import collocated
 from verification.seeds.accepted import Ours
@@ -95,9 +95,7 @@ def system(fill: Callable[[Array, Array, Array, Array], None]) -> System:
 def rate_of(state: Array, thrust: Array) -> Array:
     """(3.2)."""
     r, _, radial_rate, rate = state
-    return np.array(
-        [radial_rate, rate, r * rate**2 - r**-2.0 + thrust[0], (thrust[1] - 2.0 * radial_rate * rate) / r]
-    )
+    return np.array([radial_rate, rate, r * rate**2 - r**-2.0 + thrust[0], (thrust[1] - 2.0 * radial_rate * rate) / r])
 
 
 def asre(transfer: Transfer, fill: Callable[..., None], weight: float) -> Sequence:
@@ -187,9 +185,7 @@ def section(directory: Path) -> tuple[str, list[Figure]]:
     ours, ratios, as_printed, farthest = Ours(), dict[str, float](), 0, 0.0
     plot = plt.figure(figsize=(16, 5.5))
     path_panel, thrust_panel, change_panel = plot.subplots(1, 3)
-    colors = dict(
-        zip(TRANSFERS, ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple"), strict=True)
-    )
+    colors = dict(zip(TRANSFERS, ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple"), strict=True))
     for (name, transfer), weight, (column, fill) in product(TRANSFERS.items(), (1.0, 0.0), FILLS.items()):
         case = f"{name}, gravity in {column}, Q = {weight:.0f} I"
         best = optimum(transfer, weight)
@@ -231,9 +227,7 @@ def section(directory: Path) -> tuple[str, list[Figure]]:
         turn = np.linspace(0.0, 2.0 * pi, 200)
         path_panel.plot(radius * np.cos(turn), radius * np.sin(turn), "k", lw=0.5)
     path_panel.plot(*START[0] * np.array([[0.0], [1.0]]), "ko", ms=4)
-    path_panel.set(
-        aspect="equal", xlabel="x, radii of the first circle", ylabel="y", title="Fig. 3: trajectories"
-    )
+    path_panel.set(aspect="equal", xlabel="x, radii of the first circle", ylabel="y", title="Fig. 3: trajectories")
     thrust_panel.set(
         xlabel="time, canonical",
         ylabel="thrust, canonical",
@@ -246,9 +240,7 @@ def section(directory: Path) -> tuple[str, list[Figure]]:
     change_panel.legend(fontsize=8, loc="upper right")
     save(plot, directory / "seeds_owis.png")
 
-    weighed, pushing = (
-        [ratio for case, ratio in ratios.items() if case.endswith(end)] for end in ("1 I", "0 I")
-    )
+    weighed, pushing = ([ratio for case, ratio in ratios.items() if case.endswith(end)] for end in ("1 I", "0 I"))
     figures = [
         Figure("Q = I: least J over the optimum", "", min(weighed), "", 1.0, 1.05),
         Figure("Q = I: greatest J over the optimum", "", max(weighed), "", 1.0, 1.05),

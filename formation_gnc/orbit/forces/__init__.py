@@ -43,9 +43,7 @@ class Forces:
         Raises:
             ConfigurationError: a value out of its range.
         """
-        return np.array(
-            [int(leaf.check(getattr(self, leaf.name))) for leaf in leaves(Forces, {})], dtype=np.int64
-        )
+        return np.array([int(leaf.check(getattr(self, leaf.name))) for leaf in leaves(Forces, {})], dtype=np.int64)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,1 @@
+"""What a GNC module is, and the lock-step that joins modules."""

@@ -1,0 +1,1 @@
+"""The ROS shell: records to and from bytes, topics, processes."""

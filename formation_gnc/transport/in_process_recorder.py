@@ -1,0 +1,73 @@
+"""Records an in-process run as the recorder node would record the node graph."""
+
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.serialization import serialize_message
+from rosgraph_msgs.msg import Clock
+
+from formation_gnc import records
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.recording.reader import Bag
+from formation_gnc.recording.writer import BagWriter, TopicDefinition
+from formation_gnc.transport import topics
+from formation_gnc.transport.conversion import from_cdr, message_type, to_cdr
+from formation_gnc.types import NANOSECONDS
+
+
+class InProcessRecorder:
+    """A sink for :class:`formation_gnc.sil.runner.Run` that writes every record to a bag."""
+
+    def __init__(self, bag: BagWriter) -> None:
+        """Write to a bag, which is closed by the one who made it."""
+        self._bag = bag
+        self._counts: dict[str, int] = {}
+
+    def __call__(self, topic: str, record: Any) -> None:
+        """Write one record; the clock follows each truth, as the plant publishes it."""
+        self._write(topic, message_type(type(record)), to_cdr(record), record.time)
+        if isinstance(record, records.Truth):
+            clock = Clock()
+            clock.clock.sec, clock.clock.nanosec = divmod(record.time, NANOSECONDS)
+            self._write(topics.CLOCK, Clock, serialize_message(clock), record.time)
+
+    def copy(self, source: Bag, topic: str, data: bytes, time: int) -> None:
+        """Write a message of another bag as it is."""
+        if topic not in self._counts:
+            schema, channel = source.definition(topic)
+            assert schema is not None, "a bag gives canonical messages of defined topics only"
+            definition = TopicDefinition(
+                schema.name, schema.data, schema.encoding, channel.message_encoding, channel.metadata
+            )
+            self._bag.add_defined_topic(topic, definition)
+            self._counts[topic] = 0
+        self._counts[topic] += 1
+        self._bag.write(topic, data, time, self._counts[topic])
+
+    def _write(self, topic: str, kind: Any, data: bytes, time: int) -> None:
+        if topic not in self._counts:
+            self._bag.add_topic(topic, f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}", topics.DEPTH)
+            self._counts[topic] = 0
+        self._counts[topic] += 1
+        self._bag.write(topic, data, time, self._counts[topic])
+
+
+def reader(bag: Bag) -> Callable[[str, bytes], Any]:
+    """A function that gives the record which a message of the bag carries, by its topic and CDR bytes.
+
+    It raises ConfigurationError for a message that is not laid out as the installed type is.
+    """
+
+    known: dict[str, Any] = {}
+
+    def read(topic: str, data: bytes) -> Any:
+        record = known.get(topic)
+        if record is None:
+            bag.check_type(topic)
+            kind = bag.topics[topic].type_name
+            record = known[topic] = getattr(records, kind.rpartition("/")[2], None)
+            if record is None:
+                raise ConfigurationError(f"{bag.path}: topic {topic} has messages of type {kind}")
+        return from_cdr(record, data)
+
+    return read

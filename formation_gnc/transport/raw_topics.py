@@ -1,0 +1,84 @@
+"""Every topic of a graph as it comes: bytes, stamped with simulated time, numbered by its publishers."""
+
+import struct
+from collections.abc import Callable
+from functools import wraps
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.qos import QoSDurabilityPolicy
+
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.transport import topics
+from formation_gnc.transport.conversion import message_class
+from formation_gnc.types import NANOSECONDS
+
+Hear = Callable[[bytes, int, int | None], None]
+"""Takes a message's CDR bytes, stamp in ns and its publisher's number of it, if the middleware has one."""
+
+
+class RawTopics:
+    """Subscriptions of a node to every topic that there is, those that appear later too.
+
+    Messages are stamped with simulated time: their own header's if they begin with one, the latest tick's
+    otherwise.
+    """
+
+    def __init__(self, node: Node, open_topic: Callable[[str, str, bool], Hear]) -> None:
+        """Subscribe to nothing yet.
+
+        Args:
+            node: the one who subscribes.
+            open_topic: given a topic, its type and whether late subscribers get what was said before,
+                returns who takes its messages; raises ConfigurationError for a type that is not installed.
+        """
+        self._node, self._open = node, open_topic
+        self._known: set[str] = set()
+        self._time = 0
+
+    def look(self) -> None:
+        """Subscribe to the topics that have appeared since."""
+        for topic, (type_name, *_) in self._node.get_topic_names_and_types():
+            if topic not in self._known:
+                self._known.add(topic)
+                try:
+                    self._subscribe(topic, type_name)
+                except ConfigurationError as error:
+                    self._node.get_logger().warning(f"{topic} is not heard: {error}")
+
+    def _subscribe(self, topic: str, type_name: str) -> None:
+        kind = message_class(type_name)
+        offers = self._node.get_publishers_info_by_topic(topic)
+        quality = topics.quality()
+        if any(offer.qos_profile.durability == QoSDurabilityPolicy.VOLATILE for offer in offers):
+            quality.durability = QoSDurabilityPolicy.VOLATILE
+        hear = self._open(topic, type_name, quality.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL)
+        is_clock = topic == topics.CLOCK
+        stamped = is_clock or "std_msgs/Header" in list(kind.get_fields_and_field_types().values())[:1]
+
+        def receive(data: bytes, about: dict[str, Any]) -> None:
+            stamp = first_stamp(data) if stamped else self._time
+            if stamp < 0:  # of somebody else's making: ours has no time before 0
+                stamp = self._time
+            if is_clock:
+                self._time = stamp
+            hear(data, stamp, about["publication_sequence_number"])
+
+        self._node.create_subscription(kind, topic, _as_executor_calls(receive), quality, raw=True)
+
+
+def _as_executor_calls(receive: Callable[[bytes, dict[str, Any]], None]) -> Callable[..., None]:
+    """Take a message and what is known about it as two arguments or, from the EventsExecutor, as one pair."""
+
+    @wraps(receive)  # rclpy looks at the signature to see whether it is wanted
+    def take(*given: Any) -> None:
+        data, about = given if len(given) == 2 else given[0]
+        receive(data, about)
+
+    return take
+
+
+def first_stamp(data: bytes) -> int:
+    """The stamp that a message begins with, in ns: after four bytes that tell how it is encoded."""
+    seconds, nanoseconds = struct.unpack_from("<iI", data, 4)
+    return int(seconds * NANOSECONDS + nanoseconds)

@@ -1,0 +1,46 @@
+"""Shows a running graph live in Foxglove."""
+
+from collections.abc import Callable
+
+import rclpy
+from rclpy.context import Context
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+
+from formation_gnc.recording.live import LiveView
+from formation_gnc.recording.writer import TopicDefinition
+from formation_gnc.transport import topics
+from formation_gnc.transport.node import Executor
+from formation_gnc.transport.raw_topics import Hear, RawTopics
+
+LOOK_PERIOD = 0.5
+"""Wall time (s) between looks for new topics."""
+
+
+def show_graph(view: LiveView, ended: Callable[[], bool]) -> None:
+    """Pass everything said in this ROS domain on to a view until `ended` says so."""
+    context = Context()
+    rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+    node = rclpy.create_node("view", context=context, start_parameter_services=False)
+    executor = Executor(context=context)
+    executor.add_node(node)
+
+    def open_topic(topic: str, type_name: str, _latched: bool) -> Hear:
+        view.add(topic, TopicDefinition.installed(type_name, topics.DEPTH))
+        is_clock = topic == topics.CLOCK
+
+        def hear(data: bytes, stamp: int, _number: int | None) -> None:
+            if is_clock:
+                view.tell_time(stamp)
+            view.show(topic, data, stamp)
+
+        return hear
+
+    everything = RawTopics(node, open_topic)
+    try:
+        while not ended():
+            everything.look()
+            executor.spin_until_future_complete(Future(), timeout_sec=LOOK_PERIOD)
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown(context=context)

@@ -1,0 +1,622 @@
+"""The filter over whole flights: consistent, honest about what it cannot see, and not to be thrown by what
+it is given."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from math import cos, radians, sin
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import chi2
+
+from formation_gnc.common import Orbit
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.navigation.kernels import coast
+from formation_gnc.navigation.navigation_filter import NavigationFilter, NavigationParameters
+from formation_gnc.navigation.observability import (
+    gramian,
+    orbit_period,
+    predicted_unobservable_direction,
+    unobservable_directions,
+)
+from formation_gnc.orbit.elements import Elements, state_from_elements
+from formation_gnc.orbit.frames import hill_transform, inertial_from_relative
+from formation_gnc.parameters import load
+from formation_gnc.records import Estimate, EstimateStatus, Measurement, Rejection, Sensor
+from formation_gnc.sil.monte_carlo import Sample, navigator, nees
+from formation_gnc.sil.monte_carlo import simulate_measurements as fly
+from formation_gnc.types import Vector
+
+LEO = Orbit(6978100.0, inclination=radians(50.0))
+GEO = Orbit(42164000.0)
+
+THREE = ("radius", "range_rate", "latitude")
+
+
+def parameters(orbit: Orbit = LEO, tick: float = 10.0, **changes: Any) -> NavigationParameters:
+    return NavigationParameters(chief=orbit, tick=tick, **changes)
+
+
+def run(filter: NavigationFilter, samples: Sequence[Sample]) -> list[Estimate]:
+    answers = [filter.on_tick(sample.measurement) for sample in samples]
+    return [answer for answer in answers if answer is not None]
+
+
+def turn(estimate: Estimate) -> Vector:
+    """The change of the relative state per radian of a turn of the deputy's orbit about the Earth's axis."""
+    x, y, _, vx, vy, _ = inertial_from_relative(estimate.chief_state, estimate.relative_state)
+    return hill_transform(estimate.chief_state) @ np.array([-y, x, 0.0, -vy, vx, 0.0])
+
+
+def information_on_turn(estimate: Estimate) -> float:
+    return float(turn(estimate) @ np.linalg.solve(estimate.covariance, turn(estimate)))
+
+
+def error_in_turn(estimate: Estimate, truth: Vector) -> float:
+    """The part of the error (rad) that is a turn about the Earth's axis, by the filter's own weights."""
+    weighed = np.linalg.solve(estimate.covariance, turn(estimate))
+    return float(weighed @ (estimate.relative_state - truth)) / information_on_turn(estimate)
+
+
+@pytest.mark.parametrize("filter", ["ekf", "ukf"])
+@pytest.mark.parametrize("sensors", [THREE, (*THREE, "right_ascension"), (*THREE, "chief_range")])
+def test_error_and_innovations_are_as_large_as_the_filter_says(filter: str, sensors: tuple[str, ...]) -> None:
+    runs, ticks = (40, 60) if filter == "ekf" else (10, 40)
+    setup = parameters(LEO, tick=60.0, sensors=sensors, filter=filter, acceleration_density=1e-10)
+    errors, innovations, taken = [], 0.0, 0
+    for seed in range(runs):
+        rng = np.random.default_rng([seed, len(sensors)])
+        samples = list(fly(setup, ticks, rng))
+        estimates = run(navigator(setup), samples)
+        errors.append(nees(estimates[-1], samples[-1].truth))
+        innovations += sum(each.nis for each in estimates)
+        taken += sum(len(each.innovation) for each in estimates)
+    # Two-sided bounds that a consistent filter leaves with probability 2e-4, of fixed seeds.
+    low, high = chi2.ppf([1e-4, 1 - 1e-4], 6 * runs) / runs
+    assert low < np.mean(errors) < high
+    low, high = chi2.ppf([1e-4, 1 - 1e-4], taken) / taken
+    assert low < innovations / taken < high
+
+
+@pytest.mark.parametrize("filter", ["ekf", "ukf"])
+@pytest.mark.parametrize("orbit", [LEO, GEO, Orbit(7000000.0, 0.01, radians(98.0), 1.0, 2.0, 3.0)])
+def test_nothing_is_learnt_of_a_turn_about_the_earths_axis(orbit: Orbit, filter: str) -> None:
+    """Neither the information along the unobservable direction nor the error in it changes: seed_cases.md, for any
+    inclination."""
+    tick = 10.0 if orbit is not GEO else 120.0
+    setup = parameters(orbit, tick=tick, acceleration_density=0.0, filter=filter)
+    samples = list(fly(setup, 600 if filter == "ekf" else 120, np.random.default_rng(1)))
+    estimates = run(navigator(setup), samples)
+    # Linearised at an estimate metres off, the readings seem to tell a little: 1e-3 is nothing over an orbit.
+    assert information_on_turn(estimates[-1]) == pytest.approx(information_on_turn(estimates[0]), rel=1e-3)
+    first, last = (error_in_turn(estimates[i], samples[i].truth) for i in (0, -1))
+    sigma = information_on_turn(estimates[0]) ** -0.5
+    assert last == pytest.approx(first, abs=0.03 * sigma)
+
+
+def test_the_covariance_shows_the_unobservable_direction_and_no_other() -> None:
+    setup = parameters(GEO, tick=120.0, fix_position_sigma=100.0, fix_velocity_sigma=0.01, acceleration_density=0.0)
+    estimates = run(navigator(setup), list(fly(setup, 1440, np.random.default_rng(2))))
+    sigma = np.sqrt(np.diag(estimates[-1].covariance))
+    # Along-track about an equatorial chief: as uncertain as at the start, the others at the metre and below.
+    assert sigma[1] == pytest.approx(100.0, rel=0.02)
+    assert sigma[0] < 1.0
+    assert sigma[2] < 5.0
+
+
+@given(
+    st.floats(6.8e6, 4.5e7),
+    st.floats(0.0, 0.1),
+    st.floats(0.0, 3.0),
+    st.floats(-3.0, 3.0),
+    st.floats(-3.0, 3.0),
+)
+@settings(max_examples=20, deadline=None)
+def test_the_gramian_finds_the_predicted_direction_at_any_inclination(
+    axis: float, eccentricity: float, inclination: float, perigee: float, anomaly: float
+) -> None:
+    chief = state_from_elements(Elements(axis / (1 - eccentricity), eccentricity, inclination, 0.4, perigee, anomaly))
+    period = orbit_period(chief)
+    three = {int(Sensor.RADIUS): 25.0, int(Sensor.RANGE_RATE): 1e-4, int(Sensor.LATITUDE): 1e-12}
+    unobservable = unobservable_directions(gramian(chief, three, period), 2 * np.pi / period)
+    assert len(unobservable) == 1
+    # Unit vectors: 1e-4 of disagreement is 1e-8 in the product.
+    assert abs(unobservable[0] @ predicted_unobservable_direction(chief)) == pytest.approx(1.0, abs=1e-8)
+    four = three | {int(Sensor.RIGHT_ASCENSION): 1e-12}
+    assert not len(unobservable_directions(gramian(chief, four, period), 2 * np.pi / period))
+
+
+def test_the_predicted_direction_is_that_of_the_seed_cases() -> None:
+    """[0, cos i, -sin i cos u, -n ..., ...]: along-track and cross-track position, cross-track rate,
+    circular chief."""
+    inclination, u = 0.9, 0.7
+    chief = state_from_elements(Elements(7e6, 0.0, inclination, 0.3, 0.0, u))
+    expected = np.array([0.0, cos(inclination), -sin(inclination) * cos(u), 0.0, 0.0, sin(inclination) * sin(u)])
+    np.testing.assert_allclose(predicted_unobservable_direction(chief), expected / np.linalg.norm(expected), atol=1e-9)
+
+
+def test_the_estimate_names_the_unobservable_direction_and_follows_it() -> None:
+    setup = parameters(LEO, tick=10.0)
+    filter = navigator(setup)
+    for sample in fly(setup, 1200, np.random.default_rng(3)):  # two orbits: live windows end on the way
+        estimate = filter.on_tick(sample.measurement)
+        assert estimate is not None
+        assert estimate.unobservable in ("along-track", "cross-track", "cross-track rate")
+        predicted = predicted_unobservable_direction(sample.measurement.chief_state)
+        # 100 m from the chief, rates divided by a mean motion that J2 shifts by a part in a thousand
+        assert abs(estimate.unobservable_direction @ predicted) == pytest.approx(1.0, abs=1e-5)
+    told = [event for event in filter.take_events() if event.kind == "observability"]
+    assert told
+
+
+def test_a_fourth_measurement_makes_everything_observable() -> None:
+    setup = parameters(GEO, tick=120.0, sensors=(*THREE, "right_ascension"), fix_position_sigma=100.0)
+    samples = list(fly(setup, 720, np.random.default_rng(4)))
+    estimates = run(navigator(setup), samples)
+    assert estimates[-1].unobservable == ""
+    assert not estimates[-1].unobservable_direction.any()
+    assert np.sqrt(np.diag(estimates[-1].covariance))[:3].max() < 10.0
+    assert nees(estimates[-1], samples[-1].truth) < chi2.isf(1e-4, 6)
+
+
+def test_pseudo_measurements_say_the_same_to_first_order() -> None:
+    samples = list(fly(parameters(tick=60.0), 100, np.random.default_rng(5)))
+    plain, pseudo = (
+        run(navigator(parameters(tick=60.0, pseudo_measurements=flag)), samples)[-1] for flag in (False, True)
+    )
+    sigma = np.sqrt(np.diag(plain.covariance))
+    assert (np.abs(plain.relative_state - pseudo.relative_state) < 0.05 * sigma).all()
+    np.testing.assert_allclose(np.diag(pseudo.covariance), np.diag(plain.covariance), rtol=1e-3)
+    assert (plain.relative_state != pseudo.relative_state).any()
+
+
+@pytest.mark.parametrize("model", ["hill", "schweighart_sedwick"])
+def test_linear_process_models_hold_with_the_noise_that_covers_what_they_leave_out(model: str) -> None:
+    setup = parameters(tick=10.0, process_model=model, acceleration_density=1e-9)
+    samples = list(fly(parameters(tick=10.0), 580, np.random.default_rng(6)))
+    estimates = run(navigator(setup), samples)
+    error = estimates[-1].relative_state - samples[-1].truth
+    sigma = np.sqrt(np.diag(estimates[-1].covariance))
+    assert (np.abs(error) < 4.0 * sigma).all()
+    assert np.linalg.norm(error[:3]) < 20.0
+
+
+def test_a_swap_of_filters_in_flight_hands_over_state_and_covariance() -> None:
+    setup = parameters(tick=60.0, schedule=("{at: 1200.0, filter: ukf}", "{at: 2400.0, filter: ekf}"))
+    samples = list(fly(parameters(tick=60.0), 60, np.random.default_rng(7)))
+    swapped, plain = run(navigator(setup), samples), run(navigator(parameters(tick=60.0)), samples)
+    for one, other in zip(swapped, plain, strict=True):
+        sigma = np.sqrt(np.diag(other.covariance))
+        # Nearly linear at 100 m: the two filters differ by parts in a thousand of a sigma.
+        assert (np.abs(one.relative_state - other.relative_state) < 0.01 * sigma).all()
+    assert (swapped[19].relative_state == plain[19].relative_state).all()
+    assert (swapped[20].relative_state != plain[20].relative_state).any()
+
+
+def test_the_same_stream_gives_the_same_bits() -> None:
+    setup = parameters(tick=10.0)
+    samples = list(fly(setup, 100, np.random.default_rng(8)))
+    for one, other in zip(run(navigator(setup), samples), run(navigator(setup), samples), strict=True):
+        assert one.relative_state.tobytes() == other.relative_state.tobytes()
+        assert one.covariance.tobytes() == other.covariance.tobytes()
+
+
+def test_known_thrust_enters_the_prediction() -> None:
+    setup, force = parameters(tick=10.0), np.array([0.01, -0.01, 0.01])
+    samples = list(fly(setup, 300, np.random.default_rng(9), force))
+    assert np.linalg.norm(samples[-1].truth[:3]) > 200.0
+    assert nees(run(navigator(setup), samples)[-1], samples[-1].truth) < chi2.isf(1e-4, 6)
+
+
+def test_late_readings_tell_of_the_state_when_they_were_taken() -> None:
+    """Everything 30 s late, under thrust: taken for fresh it would be off by kilometres; and little is
+    lost."""
+    setup, force = parameters(tick=10.0, acceleration_density=1e-12), np.array([0.01, -0.01, 0.01])
+    samples = list(fly(setup, 300, np.random.default_rng(10), force))
+    late = [samples[0], *samples[1:]]
+    for index, sample in enumerate(samples):
+        old = samples[index - 3].measurement if index >= 3 else None
+        late[index] = Sample(
+            sample.truth,
+            replace(
+                sample.measurement,
+                sensor=old.sensor if old else [],
+                reading=old.reading if old else [],
+                age=[30.0] * 3 if old else [],
+            ),
+        )
+    fresh, delayed = run(navigator(setup), samples)[-1], run(navigator(setup), late)[-1]
+    assert delayed.rejections.sum() == 0
+    assert nees(delayed, samples[-1].truth) < chi2.isf(1e-4, 6)
+    assert (np.diag(delayed.covariance) < 1.5 * np.diag(fresh.covariance)).all()
+
+
+def test_outliers_are_rejected_and_counted() -> None:
+    setup, rng = parameters(tick=10.0), np.random.default_rng(11)
+    samples, wrong = [], 0
+    for index, sample in enumerate(fly(setup, 600, rng)):
+        reading = list(sample.measurement.reading)
+        if index % 20 == 10:
+            wrong += 1
+            reading[index // 20 % 3] += [250.0, -0.5, 5e-5][index // 20 % 3]  # 50 standard deviations
+        samples.append(Sample(sample.truth, replace(sample.measurement, reading=reading)))
+    estimates = run(navigator(setup), samples)
+    assert estimates[-1].rejections[Rejection.GATE] == wrong
+    assert estimates[-1].rejections.sum() == wrong
+    assert nees(estimates[-1], samples[-1].truth) < chi2.isf(1e-4, 6)
+    assert all(each.status != EstimateStatus.DIVERGED for each in estimates)
+
+
+def test_an_outage_is_flown_through_and_named() -> None:
+    setup = parameters(tick=10.0)
+    samples = [
+        Sample(
+            sample.truth,
+            replace(sample.measurement, sensor=[], reading=[], age=[]) if 100 <= index < 160 else sample.measurement,
+        )
+        for index, sample in enumerate(fly(setup, 300, np.random.default_rng(12)))
+    ]
+    estimates = run(navigator(setup), samples)
+    statuses = [each.status for each in estimates]
+    assert set(statuses[107:160]) == {EstimateStatus.COASTING}
+    assert set(statuses[160:]) == {EstimateStatus.TRACKING}
+    error = estimates[160].relative_state - samples[160].truth
+    assert (np.abs(error) < 4.0 * np.sqrt(np.diag(estimates[160].covariance))).all()
+
+
+def test_a_manoeuvre_nobody_told_of_is_answered_by_inflation() -> None:
+    setup, push = parameters(tick=10.0), np.array([0.5, 0.5, 0.5])
+    rng = np.random.default_rng(13)
+    samples = list(fly(setup, 60, rng))
+    hidden = list(fly(setup, 400, rng, push, start=samples[-1].truth))
+    chief = samples[-1].measurement
+    assert chief is not None
+    stream = [
+        Sample(sample.truth, replace(sample.measurement, applied_force=np.zeros(3), fix_available=index == 0))
+        for index, sample in enumerate(hidden)
+    ]
+    estimates = run(navigator(setup), stream)
+    assert any(each.status == EstimateStatus.DIVERGED for each in estimates)
+    assert all(np.isfinite(each.relative_state).all() for each in estimates)
+
+
+def test_a_wrong_start_is_recovered_from_by_inflation() -> None:
+    """A fix 1 km off radially at 0.5 m claimed: the gates reject everything until the covariance admits the
+    error."""
+    setup = parameters(tick=10.0)
+    samples = list(fly(setup, 580, np.random.default_rng(14)))
+    samples[0].measurement.fix[:] += [1000.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    filter = navigator(setup)
+    estimates = run(filter, samples)
+    assert any(each.status == EstimateStatus.DIVERGED for each in estimates)
+    assert estimates[-1].status == EstimateStatus.TRACKING
+    assert any(event.kind == "diverged" for event in filter.take_events())
+    assert abs(estimates[-1].relative_state[0] - samples[-1].truth[0]) < 20.0
+
+
+def test_a_state_that_cannot_be_saved_is_given_up_until_a_fix_comes() -> None:
+    setup = parameters(tick=10.0)
+    samples = list(fly(setup, 100, np.random.default_rng(15)))
+    samples[0].measurement.fix[:] += [0.0, 0.0, 4e5, 0.0, 0.0, 0.0]
+    filter = navigator(setup)
+    silent = None
+    for sample in samples:
+        measurement = sample.measurement
+        if silent is not None:  # what the plant does after a missed tick
+            measurement = replace(measurement, fix_available=True, fix=sample.truth)
+        estimate = filter.on_tick(measurement)
+        if silent is not None:
+            assert estimate is not None
+            assert estimate.status == EstimateStatus.ACQUIRED
+            break
+        if estimate is None:
+            silent = measurement.time
+    assert silent is not None
+
+
+def changed(sample: Sample, **changes: Any) -> Sample:
+    return Sample(sample.truth, replace(sample.measurement, **changes))
+
+
+@pytest.mark.parametrize("told", ["nan", "frozen", "zero"])
+def test_a_chief_whose_ephemeris_stops_is_flown_on(told: str) -> None:
+    setup = parameters(tick=10.0)
+    samples = list(fly(setup, 200, np.random.default_rng(16)))
+    frozen = samples[99].measurement.chief_state
+    wrong = {"nan": np.full(6, np.nan), "frozen": frozen, "zero": np.zeros(6)}[told]
+    stream = [
+        changed(sample, chief_state=wrong) if 100 <= index < 150 else sample for index, sample in enumerate(samples)
+    ]
+    estimates = run(navigator(setup), stream)
+    assert len(estimates) == 200
+    assert {each.status for each in estimates[100:150]} == {EstimateStatus.CHIEF_LOST}
+    assert estimates[-1].rejections[Rejection.CHIEF] == 50
+    assert estimates[-1].status == EstimateStatus.TRACKING
+    assert nees(estimates[149], samples[149].truth) < chi2.isf(1e-4, 6)
+    assert nees(estimates[-1], samples[-1].truth) < chi2.isf(1e-4, 6)
+
+
+def test_a_chief_that_goes_on_from_elsewhere_is_taken_up_again() -> None:
+    """A manoeuvre of the chief, or an ephemeris corrected by more than its model: two in a row that fit
+    make an orbit."""
+    setup = parameters(tick=10.0)
+    other = Elements(**vars(replace(LEO, true_anomaly=1e-4)))  # 700 m ahead
+    samples = list(fly(setup, 40, np.random.default_rng(17)))
+    chief = state_from_elements(other)
+    stream = []
+    for index, sample in enumerate(samples):
+        stream.append(changed(sample, chief_state=chief) if index >= 20 else sample)
+        chief = coast(chief, np.zeros(3), 10.0, 1)
+    estimates = run(navigator(setup), stream)
+    assert estimates[20].status == EstimateStatus.CHIEF_LOST
+    assert estimates[21].status == EstimateStatus.TRACKING
+    assert estimates[-1].rejections[Rejection.CHIEF] == 1
+    assert estimates[-1].relative_state[1] == pytest.approx(samples[-1].truth[1] - 697.81, abs=20.0)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "reason"),
+    [
+        (lambda m: replace(m, reading=[np.nan, *m.reading[1:]]), Rejection.NOT_FINITE),
+        (lambda m: replace(m, reading=[np.inf, *m.reading[1:]]), Rejection.NOT_FINITE),
+        (lambda m: replace(m, age=[np.nan, 0.0, 0.0]), Rejection.NOT_FINITE),
+        (lambda m: replace(m, age=m.age[1:]), Rejection.NOT_FINITE),
+        (lambda m: replace(m, reading=[m.reading[0] + 1e3, *m.reading[1:]]), Rejection.GATE),
+        (lambda m: replace(m, reading=[1e300, *m.reading[1:]]), Rejection.GATE),
+        (lambda m: replace(m, age=[-10.0, 0.0, 0.0]), Rejection.FUTURE),
+        (lambda m: replace(m, age=[1e9, 0.0, 0.0]), Rejection.LATE),
+        (
+            lambda m: replace(
+                m,
+                sensor=[*m.sensor, m.sensor[0]],
+                reading=[*m.reading, m.reading[0]],
+                age=[*m.age, m.age[0]],
+            ),
+            Rejection.DUPLICATE,
+        ),
+        (lambda m: replace(m, age=[10.0, 0.0, 0.0]), Rejection.DUPLICATE),  # taken when the last one was
+        (lambda m: replace(m, sensor=[77, *m.sensor[1:]]), Rejection.UNKNOWN_SENSOR),
+        (lambda m: replace(m, applied_force=np.full(3, np.nan)), Rejection.AVIONICS),
+        (lambda m: replace(m, mass=np.nan), Rejection.AVIONICS),
+        (lambda m: replace(m, mass=0.0), Rejection.AVIONICS),
+        (lambda m: replace(m, chief_state=m.chief_state * np.nan), Rejection.CHIEF),
+        (lambda m: replace(m, fix_available=True, fix=m.fix * np.nan), Rejection.FIX),
+    ],
+)
+def test_what_is_wrong_is_rejected_and_the_rest_is_used(
+    spoil: Callable[[Measurement], Measurement], reason: Rejection
+) -> None:
+    setup = parameters(tick=10.0)
+    samples = list(fly(setup, 12, np.random.default_rng(18)))
+    filter = navigator(setup)
+    run(filter, samples[:10])
+    estimate = filter.on_tick(spoil(samples[10].measurement))
+    assert estimate is not None
+    counts = np.zeros(len(Rejection), dtype=np.uint32)
+    counts[reason] = 1
+    np.testing.assert_array_equal(estimate.rejections, counts)
+    assert any(event.kind == "rejected" for event in filter.take_events())
+    after = filter.on_tick(samples[11].measurement)
+    assert after is not None
+    assert after.sensor == samples[11].measurement.sensor
+    assert nees(after, samples[11].truth) < chi2.isf(1e-4, 6)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "reason"),
+    [
+        (lambda m: replace(m, deputy="deputy2"), Rejection.WRONG_DEPUTY),
+        (lambda m: replace(m, time=m.time - 10_000_000_000), Rejection.DUPLICATE),
+        (lambda m: replace(m, time=m.time - 50_000_000_000), Rejection.OUT_OF_ORDER),
+        (lambda m: replace(m, time=m.time + 10**16), Rejection.FUTURE),
+    ],
+)
+def test_a_measurement_that_is_not_the_next_one_changes_nothing(
+    spoil: Callable[[Measurement], Measurement], reason: Rejection
+) -> None:
+    setup = parameters(tick=10.0)
+    samples = list(fly(setup, 12, np.random.default_rng(19)))
+    spoilt, clean = navigator(setup), navigator(setup)
+    run(spoilt, samples[:10])
+    run(clean, samples[:10])
+    assert spoilt.on_tick(spoil(samples[10].measurement)) is None
+    one, other = spoilt.on_tick(samples[10].measurement), clean.on_tick(samples[10].measurement)
+    assert one is not None
+    assert other is not None
+    assert one.rejections[reason] == 1
+    assert one.covariance.tobytes() == other.covariance.tobytes()
+
+
+def test_ticks_that_never_arrive_are_predicted_over() -> None:
+    setup = parameters(tick=10.0)
+    samples = list(fly(setup, 60, np.random.default_rng(20)))
+    stream = samples[:20] + samples[40:]
+    estimates = run(navigator(setup), stream)
+    assert len(estimates) == 40
+    assert nees(estimates[20], samples[40].truth) < chi2.isf(1e-4, 6)
+
+
+def test_a_new_run_starts_with_new_counts() -> None:
+    setup = parameters(tick=10.0)
+    samples = list(fly(setup, 20, np.random.default_rng(21)))
+    filter = navigator(setup)
+    first = run(filter, samples)
+    filter.on_tick(replace(samples[19].measurement, time=5))
+    again = run(filter, samples)
+    assert [each.relative_state.tobytes() for each in again] == [each.relative_state.tobytes() for each in first]
+    assert again[-1].rejections.sum() == 0
+
+
+NAN3, NAN6 = np.full(3, np.nan), np.full(6, np.nan)
+SPOILS: dict[str, Callable[[Measurement], Measurement]] = {
+    "nan reading": lambda m: replace(m, reading=[np.nan] * len(m.reading)),
+    "huge reading": lambda m: replace(m, reading=[1e308] * len(m.reading)),
+    "negative reading": lambda m: replace(m, reading=[-each for each in m.reading]),
+    "zero reading": lambda m: replace(m, reading=[0.0] * len(m.reading)),
+    "future": lambda m: replace(m, age=[-1.0] * len(m.age)),
+    "old": lambda m: replace(m, age=[45.0] * len(m.age)),
+    "nan age": lambda m: replace(m, age=[np.nan] * len(m.age)),
+    "no readings": lambda m: replace(m, sensor=[], reading=[], age=[]),
+    "lengths": lambda m: replace(m, reading=m.reading[:1]),
+    "other sensors": lambda m: replace(m, sensor=[9] * len(m.sensor)),
+    "wrong sensors": lambda m: replace(m, sensor=m.sensor[::-1]),
+    "same sensor": lambda m: replace(m, sensor=[0] * len(m.sensor)),
+    "nan chief": lambda m: replace(m, chief_state=NAN6),
+    "zero chief": lambda m: replace(m, chief_state=np.zeros(6)),
+    "huge chief": lambda m: replace(m, chief_state=np.full(6, 1e200)),
+    "frozen chief": lambda m: replace(m, chief_state=np.array([7e6, 0, 0, 0, 5e3, 5e3])),
+    "nan force": lambda m: replace(m, applied_force=NAN3),
+    "huge force": lambda m: replace(m, applied_force=np.full(3, 1e300)),
+    "large force": lambda m: replace(m, applied_force=np.full(3, 1e5)),
+    "no mass": lambda m: replace(m, mass=0.0),
+    "tiny mass": lambda m: replace(m, mass=1e-300),
+    "nan mass": lambda m: replace(m, mass=np.nan),
+    "wrong deputy": lambda m: replace(m, deputy="other"),
+    "far future": lambda m: replace(m, time=m.time + 2**61),
+    "soon": lambda m: replace(m, time=m.time + 3_000_000_001),
+    "past": lambda m: replace(m, time=max(0, m.time - 25_000_000_000)),
+    "nan fix": lambda m: replace(m, fix_available=True, fix=NAN6),
+    "far fix": lambda m: replace(m, fix_available=True, fix=np.full(6, 1e300)),
+    "large fix": lambda m: replace(m, fix_available=True, fix=np.full(6, 3e5)),
+    "zero fix": lambda m: replace(m, fix_available=True, fix=np.zeros(6)),
+    "past with a fix": lambda m: replace(m, fix_available=True, time=max(0, m.time - 25_000_000_000)),
+}
+
+FLIGHT = list(fly(parameters(tick=10.0), 40, np.random.default_rng(22)))
+
+
+def check(estimate: Estimate) -> None:
+    assert np.isfinite(estimate.relative_state).all()
+    assert np.isfinite(estimate.chief_state).all()
+    assert np.isfinite(estimate.unobservable_direction).all()
+    assert np.isfinite([estimate.nis, estimate.mass, *estimate.innovation, *estimate.innovation_sigma]).all()
+    scale = np.sqrt(np.diag(estimate.covariance))
+    assert np.isfinite(scale).all()
+    assert (scale > 0.0).all()
+    # symmetric to the bit, and positive definite whatever the units
+    assert (estimate.covariance == estimate.covariance.T).all()
+    assert np.linalg.eigvalsh(estimate.covariance / np.outer(scale, scale))[0] > 0.0
+
+
+@given(
+    st.lists(
+        st.tuples(st.integers(0, 39), st.integers(1, 12), st.sampled_from(sorted(SPOILS))),
+        min_size=1,
+        max_size=8,
+    ),
+    st.lists(st.integers(0, 39), max_size=5),
+    st.lists(st.tuples(st.integers(0, 39), st.integers(0, 39)), max_size=3),
+    st.sampled_from(["ekf", "ukf"]),
+    st.sampled_from(["nonlinear_j2", "hill"]),
+    st.booleans(),
+)
+@settings(max_examples=60, deadline=None)
+def test_no_stream_gives_an_estimate_that_is_not_finite_and_definite(
+    spoils: list[tuple[int, int, str]],
+    doubled: list[int],
+    exchanged: list[tuple[int, int]],
+    filter: str,
+    model: str,
+    pseudo: bool,
+) -> None:
+    stream = [sample.measurement for sample in FLIGHT]
+    for start, count, name in spoils:
+        for index in range(start, min(40, start + count)):
+            stream[index] = SPOILS[name](stream[index])
+    for one, other in exchanged:
+        stream[one], stream[other] = stream[other], stream[one]
+    for index in doubled:
+        stream.insert(index, stream[index])
+    setup = parameters(tick=10.0, filter=filter, process_model=model, pseudo_measurements=pseudo)
+    part = navigator(setup)
+    silent = True
+    for measurement in stream:
+        estimate = part.on_tick(measurement)
+        silent = estimate is None
+        if estimate is not None:
+            check(estimate)
+    # Whatever has happened: with a good fix after a silent tick, as the plant gives it, it flies on.
+    for index, sample in enumerate(fly(setup, 4, np.random.default_rng(23))):
+        measurement = replace(sample.measurement, time=(1000 + index) * setup.tick_ns, fix_available=True)
+        estimate = part.on_tick(replace(measurement, fix=sample.truth))
+        if estimate is not None:
+            check(estimate)
+            silent = False
+    assert not silent
+
+
+def test_a_satellite_above_the_pole_is_told_that_latitude_has_no_direction_there() -> None:
+    setup = parameters(Orbit(7e6, inclination=radians(90.0), true_anomaly=radians(90.0)), tick=10.0)
+    samples = list(fly(setup, 10, np.random.default_rng(24), start=np.zeros(6)))
+    samples[0].measurement.fix[:] = 0.0
+    estimates = run(navigator(setup), samples)
+    assert len(estimates) == 10
+    for estimate in estimates:
+        check(estimate)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"sensors": ["radius", "sextant"]},
+        {"sensors": []},
+        {"sensors": ["radius", "radius"]},
+        {"radius_sigma": 0.0},
+        {"latitude_sigma": -1e-6},
+        {"fix_position_sigma": 0.0},
+        {"acceleration_density": -1.0},
+        {"acceleration_density": float("nan")},
+        {"gate": 0.0},
+        {"filter": "particle"},
+        {"process_model": "kepler"},
+    ],
+)
+def test_parameters_that_make_no_covariance_are_rejected(changes: dict[str, Any]) -> None:
+    with pytest.raises(ConfigurationError, match=next(iter(changes))):
+        load(NavigationParameters, {"chief.semi_major_axis": 7e6, **changes})
+
+
+def test_a_fix_at_hand_when_the_filter_diverges_is_taken() -> None:
+    setup = parameters(tick=10.0)
+    samples = list(fly(setup, 30, np.random.default_rng(25)))
+    samples[0].measurement.fix[:] += [1000.0, 0.0, 1000.0, 1.0, 0.0, 0.0]
+    stream = [
+        changed(sample, fix_available=True, fix=sample.truth) if index == 4 else sample
+        for index, sample in enumerate(samples)
+    ]  # the fifth update in which the gates reject everything
+    estimates = run(navigator(setup), stream)
+    assert [each.status for each in estimates].count(EstimateStatus.ACQUIRED) == 2
+    assert estimates[4].status == EstimateStatus.ACQUIRED
+    assert estimates[4].sensor == samples[4].measurement.sensor
+    assert nees(estimates[-1], samples[-1].truth) < chi2.isf(1e-4, 6)
+
+
+def test_a_faulty_sensor_alone_is_no_divergence() -> None:
+    setup = parameters(tick=10.0)
+    stream = [
+        changed(sample, reading=[sample.measurement.reading[0] + 500.0, *sample.measurement.reading[1:]])
+        for sample in fly(setup, 200, np.random.default_rng(26))
+    ]
+    estimates = run(navigator(setup), stream)
+    assert estimates[-1].rejections[Rejection.GATE] == 200
+    assert {each.status for each in estimates[1:]} == {EstimateStatus.TRACKING}
+
+
+def test_the_filter_is_the_same_whatever_came_with_a_reading_it_does_not_use() -> None:
+    setup = parameters(tick=10.0)
+    samples = list(fly(replace(setup, sensors=(*THREE, "chief_range")), 50, np.random.default_rng(27)))
+    bare = [
+        changed(
+            sample,
+            sensor=sample.measurement.sensor[:3],
+            reading=sample.measurement.reading[:3],
+            age=sample.measurement.age[:3],
+        )
+        for sample in samples
+    ]
+    one, other = run(navigator(setup), samples)[-1], run(navigator(setup), bare)[-1]
+    assert one.covariance.tobytes() == other.covariance.tobytes()
+    assert one.rejections.sum() == 0

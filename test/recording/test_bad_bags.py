@@ -1,0 +1,164 @@
+"""What every command says to a bag that is none, or no longer one: a line with the reason, and no more."""
+
+import shutil
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from mcap.writer import Writer
+
+from formation_gnc.cli import main
+from formation_gnc.recording import Bag
+from formation_gnc.recording.writer import BagWriter, TopicDefinition
+from formation_gnc.sil.runner import Run
+from formation_gnc.sil.scenario import load_scenario
+from formation_gnc.transport.in_process_recorder import InProcessRecorder
+
+COMMANDS: dict[str, Callable[[Path, Path], list[str]]] = {
+    "report": lambda bag, out: ["report", str(bag), "--output", str(out / "report.html")],
+    "export": lambda bag, out: ["export", str(bag), "--output", str(out / "tables"), "--attachments"],
+    "compare": lambda bag, out: ["compare", str(bag), str(bag)],
+    "navigate": lambda bag, out: ["navigate", str(bag)],
+    "replay": lambda bag, out: ["replay", str(bag), "--bag", str(out / "again")],
+    "recover": lambda bag, out: ["recover", str(bag), "--output", str(out / "saved")],
+}
+
+
+@pytest.fixture(autouse=True)
+def _own_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("signal.signal", lambda *_: None)  # the command means to own its process
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A whole bag of several chunks."""
+    directory = tmp_path_factory.mktemp("flown") / "bag"
+    run = Run(load_scenario("leader_follower", {"/plant": {"duration": 20.0}}))
+    with BagWriter(directory, {"run": {"scenario": "leader_follower"}}, {"a.yaml": b"a: 1\n"}) as writer:
+        sink = InProcessRecorder(writer)
+        while not run.plant.finished:
+            run.tick(sink)
+            if run.plant.tick % 5 == 0:
+                writer.flush()
+    return directory
+
+
+def retyped(flown: Path, directory: Path, change: Callable[[TopicDefinition], TopicDefinition]) -> Path:
+    """The bag with other definitions, as another version of the messages would leave it."""
+    bag = Bag(flown)
+    with BagWriter(directory, {}) as writer:
+        for topic in bag.topics:
+            schema, channel = bag.definition(topic)
+            assert schema is not None
+            definition = TopicDefinition(schema.name, schema.data, metadata=channel.metadata)
+            writer.add_defined_topic(topic, change(definition))
+        for number, (topic, data, stamp) in enumerate(bag.messages()):
+            writer.write(topic, data, stamp, number)
+    return directory
+
+
+def older(definition: TopicDefinition) -> TopicDefinition:
+    """Messages as an older package had them: fields of other names."""
+    schema = definition.schema
+    for name in (b"mass", b"relative_state", b"reading", b"force", b"iterations", b"kind"):
+        schema = schema.replace(b" " + name, b" old_" + name)
+    return TopicDefinition(definition.type_name, schema, metadata=definition.metadata)
+
+
+def foreign(definition: TopicDefinition) -> TopicDefinition:
+    return TopicDefinition("other.Message", b"\x0a\x01", schema_encoding="protobuf", message_encoding="protobuf")
+
+
+def without_schema(path: Path) -> Path:
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        channel = writer.register_channel("/truth", "json", 0)
+        writer.add_message(channel, 0, b"{}", 0)
+        writer.finish()
+    return path
+
+
+@pytest.fixture(scope="module")
+def bad(flown: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    directory = tmp_path_factory.mktemp("bad")
+    (mcap,) = flown.glob("*.mcap")
+    content = mcap.read_bytes()
+    (directory / "empty").mkdir()
+    (directory / "words.mcap").write_bytes(b"not a bag " * 100)
+    (directory / "nothing.mcap").write_bytes(b"")
+    (directory / "cut.mcap").write_bytes(content[: len(content) * 2 // 3])
+    broken = bytearray(content)
+    broken[len(content) // 2 : len(content) // 2 + 40] = b"\xff" * 40
+    (directory / "broken.mcap").write_bytes(broken)
+    BagWriter(directory / "silent", {}).close()
+    return {
+        "a path that is not there": directory / "nowhere",
+        "an empty directory": directory / "empty",
+        "no bag at all": directory / "words.mcap",
+        "a file of no bytes": directory / "nothing.mcap",
+        "a bag without messages": directory / "silent",
+        "a cut bag": directory / "cut.mcap",
+        "a broken chunk": directory / "broken.mcap",
+        "another version's messages": retyped(flown, directory / "older", older),
+        "unknown schemas": retyped(flown, directory / "foreign", foreign),
+        "no schemas": without_schema(directory / "json.mcap"),
+    }
+
+
+KINDS = [
+    *("a path that is not there", "an empty directory", "no bag at all", "a file of no bytes"),
+    *("a bag without messages", "a cut bag", "a broken chunk"),
+    *("another version's messages", "unknown schemas", "no schemas"),
+]
+WHOLE_ENOUGH = {"a cut bag", "a bag without messages", "another version's messages"}
+"""What some command has a use for. The others save what they can, or say why not."""
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_bad_bag_is_answered_with_one_line(
+    bad: dict[str, Path], command: str, kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status = main(COMMANDS[command](bad[kind], tmp_path))
+    output, errors = capsys.readouterr()
+    if command == "recover" and kind not in ("a path that is not there", "an empty directory"):
+        assert status in (0, 1, 3)
+        assert output
+        return
+    if status == 0:
+        assert kind in WHOLE_ENOUGH
+        return
+    assert status in (1, 2)
+    assert errors.count("\n") == 1, errors
+    assert errors.startswith("formation-gnc: ")
+    assert bad[kind].name in errors or status == 1
+
+
+@pytest.mark.parametrize("command", ["export", "compare", "navigate", "replay", "recover"])
+@settings(
+    max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)  # the whole sweep of bytes is test_recover's
+@given(data=st.data())
+def test_bytes_cut_and_flipped_anywhere_never_end_in_a_traceback(
+    flown: Path, tmp_path: Path, command: str, data: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (mcap,) = flown.glob("*.mcap")
+    content = bytearray(mcap.read_bytes())
+    for at in data.draw(st.lists(st.integers(0, len(content) - 1), max_size=3)):
+        content[at] ^= data.draw(st.integers(1, 255))
+    del content[data.draw(st.integers(len(content) // 4, len(content))) :]
+    directory = tmp_path / "case"
+    shutil.rmtree(directory, ignore_errors=True)
+    directory.mkdir()
+    (directory / "bag.mcap").write_bytes(content)
+    capsys.readouterr()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # damaged numbers may overflow on the way to a figure
+        status = main(COMMANDS[command](directory / "bag.mcap", directory))
+    assert status in (0, 1, 2, 3)
+    assert capsys.readouterr().err.count("\n") <= 1
