@@ -58,7 +58,7 @@ def fly(law: Controller, start: NDArray[np.float64] = START) -> tuple[NDArray[np
     for tick in range(TICKS):
         time = tick * NANOSECONDS
         seen = NavigationState(time, state + noise[tick], CHIEF, 100.0)
-        aim = Target(time, "", np.zeros(6), 60.0, nowhere)
+        aim = Target(time, "", np.zeros(6), 60 * NANOSECONDS, nowhere)
         started = thread_time()
         command = law.command(seen, aim)
         times[tick] = thread_time() - started

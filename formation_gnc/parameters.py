@@ -8,6 +8,7 @@ are the prefix: ``deputy1.mass``.
 
 import dataclasses
 import difflib
+import json
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -172,6 +173,11 @@ def load[T](schema: type[T], values: Mapping[str, Any]) -> T:
         else:
             checked[leaf.name] = leaf.default
     return _build(schema, checked, "")
+
+
+def to_json(value: Any) -> str:
+    """A parameter's value as JSON; tuples and numeric arrays, also of ROS and NumPy, become lists."""
+    return json.dumps(value, default=lambda array: array.tolist())
 
 
 def _build[T](schema: type[T], checked: Mapping[str, Any], prefix: str) -> T:

@@ -1,20 +1,27 @@
-"""What the parts of the system hand to one another at a tick.
+"""Records that the modules exchange at every tick.
 
-Each class mirrors the message of the same name in ``msg_defs/``, where units and frames are given; `time` is
-the message's stamp in nanoseconds of simulated time; `NavigationState` is read from the message of an
-`Estimate`, of which it is a part. The core speaks these, the ROS shell translates them.
+A record mirrors its message in ``msg_defs/`` field by field; units and frames are given there. `time` is the
+stamp of the header. Times and durations are int nanoseconds of simulated time.
 """
 
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
+from formation_gnc.types import Matrix, Times, Vector
 
-NANOSECONDS = 1_000_000_000
+
+class Record:
+    """Base of all records."""
+
+    __slots__ = ()
+    message: ClassVar[str]
+    """Name of the message that the record mirrors; the record may lack fields of one that it only reads."""
+    frame_id: ClassVar[str] = ""
+    """Frame named in the message's header."""
 
 
 class Sensor(IntEnum):
@@ -54,13 +61,38 @@ class Rejection(IntEnum):
     FIX = 11
 
 
+class EventKind(IntEnum):
+    """What happened; the constants of Event.msg."""
+
+    PARAMETERS = 0
+    REJECTED = 1
+    HANDOVER = 2
+    FALLBACK = 3
+    ACQUIRED = 4
+    LOST = 5
+    DIVERGED = 6
+    CHIEF = 7
+    OBSERVABILITY = 8
+    RECONFIGURATION = 9
+    INFEASIBLE = 10
+    ASSIGNMENT = 11
+    SEPARATION = 12
+    WARNING = 13
+    MISS = 14
+    THRUSTERS = 15
+    END = 16
+
+
 Counts = NDArray[np.uint32]
 """A number for every `Rejection`."""
 
 
 @dataclass(slots=True)
-class Measurement:
+class Measurement(Record):
     """What one deputy knows at a tick before it thinks."""
+
+    message: ClassVar = "Measurement"
+    frame_id: ClassVar = "inertial"
 
     time: int
     chief_state: Vector  # (6,)
@@ -76,8 +108,11 @@ class Measurement:
 
 
 @dataclass(slots=True)
-class NavigationState:
+class NavigationState(Record):
     """What guidance and control use of an estimate, and all that they read of its message."""
+
+    message: ClassVar = "Estimate"
+    frame_id: ClassVar = "hill"
 
     time: int
     relative_state: Vector  # (6,)
@@ -101,34 +136,43 @@ class Estimate(NavigationState):
     unobservable: str = ""
 
 
-NO_ECLIPSE: Matrix = np.empty((0, 2))
-NOBODY: Matrix = np.empty((0, 6))
+NO_ECLIPSES: Times = np.empty((0, 2), dtype=np.int64)
+NO_NEIGHBOURS: Matrix = np.empty((0, 6))
 
 
 @dataclass(slots=True)
-class Target:
+class Target(Record):
     """Relative state that a deputy is to have, now and over the horizon."""
+
+    message: ClassVar = "Target"
+    frame_id: ClassVar = "hill"
 
     time: int
     formation: str
     relative_state: Vector  # (6,)
-    preview_step: float
-    preview: Matrix = field(metadata={"shape": (-1, 6)})
-    eclipse: Matrix = field(default_factory=lambda: NO_ECLIPSE, metadata={"shape": (-1, 2)})
-    others: Matrix = field(default_factory=lambda: NOBODY, metadata={"shape": (-1, 6)})
+    preview_step: int
+    preview: Matrix  # (N, 6), a row for each RelativeState
+    eclipses: Times = field(default_factory=lambda: NO_ECLIPSES)  # (N, 2), a row for each Interval
+    neighbours: Matrix = field(default_factory=lambda: NO_NEIGHBOURS)  # (N, 6), a row for each RelativeState
 
 
 @dataclass(slots=True)
-class Thrust:
+class Thrust(Record):
     """Force the thrusters are to give until the next tick, Hill frame, N."""
+
+    message: ClassVar = "Thrust"
+    frame_id: ClassVar = "hill"
 
     time: int
     force: Vector  # (3,)
 
 
 @dataclass(slots=True)
-class Status:
+class Status(Record):
     """How the controller came to its command."""
+
+    message: ClassVar = "Status"
+    frame_id: ClassVar = "hill"
 
     time: int
     algorithm: str
@@ -141,21 +185,31 @@ class Status:
 
 
 @dataclass(slots=True)
-class Separation:
-    """How near a deputy will come to the others of its fleet, as far as it can tell."""
+class Separation(Record):
+    """Predicted least distances of a deputy to the other satellites of its fleet."""
+
+    message: ClassVar = "Separation"
+    frame_id: ClassVar = "hill"
 
     time: int
     planned: float
-    planned_time: float
-    planned_other: str
+    planned_time: int
+    planned_neighbour: str
     passive: float
-    passive_time: float
-    passive_other: str
+    passive_time: int
+    passive_neighbour: str
+
+    @property
+    def nearest(self) -> str:
+        """Name of the neighbour at the lesser of both distances."""
+        return self.planned_neighbour if self.planned <= self.passive else self.passive_neighbour
 
 
 @dataclass(slots=True)
-class SatelliteTruth:
+class SatelliteTruth(Record):
     """True state of one deputy."""
+
+    message: ClassVar = "SatelliteTruth"
 
     name: str
     inertial_state: Vector  # (6,)
@@ -166,8 +220,11 @@ class SatelliteTruth:
 
 
 @dataclass(slots=True)
-class Truth:
+class Truth(Record):
     """What really is."""
+
+    message: ClassVar = "Truth"
+    frame_id: ClassVar = "inertial"
 
     time: int
     chief_state: Vector  # (6,)
@@ -175,20 +232,46 @@ class Truth:
 
 
 @dataclass(slots=True)
-class Event:
+class ParameterChange(Record):
+    """A parameter that changed in flight, values as JSON."""
+
+    message: ClassVar = "ParameterChange"
+
+    name: str
+    old_value: str
+    new_value: str
+
+
+@dataclass(slots=True)
+class Event(Record):
     """Something that happened to the run."""
+
+    message: ClassVar = "Event"
 
     time: int
     tick: int
     node: str
-    kind: str
-    detail: str
+    kind: int  # EventKind
+    subject: str = ""
+    changes: list[ParameterChange] = field(default_factory=list)
+    detail: str = ""
+
+    def __str__(self) -> str:
+        """One line for people."""
+        return ": ".join(filter(None, [f"tick {self.tick}", kind_name(self.kind), self.subject, self.detail]))
+
+
+def kind_name(kind: int) -> str:
+    """Name of an event's kind in lower case; "kind 42" for one that this version does not know."""
+    return EventKind(kind).name.lower() if kind in EventKind else f"kind {kind}"
 
 
 @dataclass(slots=True)
-class Timing:
-    """Wall time that a node took for a tick; apart from everything that must be reproducible."""
+class Timing(Record):
+    """Wall time of a node's computation in a tick; apart from everything that must be reproducible."""
+
+    message: ClassVar = "Timing"
 
     time: int
     node: str
-    compute_time: float
+    compute_time: int

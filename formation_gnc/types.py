@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
+Times = NDArray[np.int64]
 
 NANOSECONDS = 1_000_000_000
 """Nanoseconds in a second: stamps and durations are whole nanoseconds of simulated time."""

@@ -14,7 +14,7 @@ from formation_gnc.analysis.compare import gnc_topics
 from formation_gnc.cli import main
 from formation_gnc.recording.reader import Bag, identical, read
 from formation_gnc.recording.writer import BagWriter, TopicDefinition
-from formation_gnc.records import Timing
+from formation_gnc.records import EventKind, Timing
 from formation_gnc.sil.replay import KINDS, nodes_of, parameters_of, replay
 from formation_gnc.sil.scenario import find_scenario, load_scenario
 from formation_gnc.transport.conversion import codec
@@ -147,7 +147,7 @@ def test_swaps_by_schedule_and_by_hand_are_flown_again_at_their_tick(
     bag = tmp_path / "swaps"
     assert main(["sil", str(tmp_path / "swaps.yaml"), "--in-process", "--bag", str(bag), "--duration", "300"]) == 0
     assert replayed(bag, tmp_path / "again")[0] == 0
-    assert list(Bag(bag).arrays("/events")["kind"]).count("parameters") == 3
+    assert list(Bag(bag).arrays("/events")["kind"]).count(EventKind.PARAMETERS) == 3
     # without the schedule in its parameters, the same swaps are changes that somebody made in flight
     recorded = Bag(bag)
     values = {node: parameters_of(recorded, node) for node in nodes_of(recorded, KINDS)}
@@ -208,7 +208,7 @@ def test_what_a_node_did_not_get_out_before_it_was_killed_is_not_missed(
 ) -> None:
     status, end = "/deputy1/status", 50 * NANOSECONDS
     ticks = Bag(flown).arrays(status)["stamp_ns"].tolist()
-    timings = {stamp: codec(Timing).encode(Timing(stamp, "controller", 1e-4)) for stamp in ticks}
+    timings = {stamp: codec(Timing).encode(Timing(stamp, "controller", 100_000)) for stamp in ticks}
     lost = {(status, end): 0}
     whole = rewritten(Bag(flown), tmp_path / "whole", lost, {}, timings)
     assert replayed(whole, tmp_path / "whole again", "--nodes", "controller")[0] == 1

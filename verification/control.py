@@ -60,7 +60,7 @@ def fly(
     steps = max(1, math.ceil(tick / 60.0))
     for index in range(ticks):
         time = index * tick
-        aim = Target(round(time * NANOSECONDS), "", goal(time), tick, np.empty((0, 6)))
+        aim = Target(round(time * NANOSECONDS), "", goal(time), round(tick * NANOSECONDS), np.empty((0, 6)))
         force = np.clip(law.command(estimate(time, states[-1], chief, mass), aim).force, -limit, limit)
         forces.append(force)
         thrust = force @ hill_rotation(chief) / mass

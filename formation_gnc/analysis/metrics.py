@@ -6,6 +6,7 @@ import numpy as np
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.recording.reader import Bag
+from formation_gnc.records import EventKind
 from formation_gnc.types import Matrix, Vector
 
 
@@ -129,5 +130,5 @@ def figures(bag: Bag) -> RunFigures:
             delta_v_axes_m_s=flown.delta_v.tolist(),
         )
     has_events = "/events" in bag.topics and bag.topics["/events"].count > 0
-    misses = np.count_nonzero(bag.arrays("/events")["kind"] == "miss") if has_events else 0
+    misses = np.count_nonzero(bag.arrays("/events")["kind"] == EventKind.MISS) if has_events else 0
     return RunFigures(bag.topics["/truth"].count, int(misses), deputies)

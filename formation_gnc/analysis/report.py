@@ -98,13 +98,13 @@ def _listed(flown: RunHistory) -> str:
     """All events in a table."""
     rows = "".join(
         f"<tr><td>{3600.0 * mark.time:.3f}</td>"
-        + "".join(f"<td>{escape(word)}</td>" for word in (mark.kind, mark.node, mark.detail))
+        + "".join(f"<td>{escape(word)}</td>" for word in (mark.kind, mark.subject, mark.node, mark.detail))
         + "</tr>"
         for mark in flown.events
     )
     more = flown.counts.total() - len(flown.events)
     rest = f"<p>and {more} more</p>" if more else ""
-    head = "<tr><th>time [s]</th><th>kind</th><th>node</th><th>detail</th></tr>"
+    head = "<tr><th>time [s]</th><th>kind</th><th>subject</th><th>node</th><th>detail</th></tr>"
     return f"<h2>Events</h2><table>{head}{rows}</table>{rest}"
 
 

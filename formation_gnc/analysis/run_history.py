@@ -1,6 +1,5 @@
 """A recorded run as curves to draw: read once, thinned while it is read, for bags of any length."""
 
-import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,7 +11,9 @@ from numpy.typing import NDArray
 
 from formation_gnc.analysis.metrics import deputies_of
 from formation_gnc.analysis.separation import Separation, minimum_separation
+from formation_gnc.recording.decode import nanoseconds
 from formation_gnc.recording.reader import Bag
+from formation_gnc.records import kind_name
 from formation_gnc.types import Matrix, Vector
 
 POINTS = 2000
@@ -71,6 +72,7 @@ class Mark:
     time: float
     kind: str
     node: str
+    subject: str
     detail: str
 
 
@@ -160,7 +162,7 @@ class DeputyHistory:
     def _on_timing(self, batch: Batch) -> None:
         for node in np.unique(batch["node"].astype(str)):
             own = batch["node"] == node
-            rows = np.column_stack((batch["time"][own] / HOUR, 1e3 * batch["compute_time"][own]))
+            rows = np.column_stack((batch["time"][own] / HOUR, 1e-6 * nanoseconds(batch, "compute_time")[own]))
             self._timing.add(str(node), rows)
 
     def finish(self, end: float) -> None:
@@ -216,13 +218,13 @@ class RunHistory:
         self.distances: dict[tuple[str, str], Matrix] = self._distances.rows
 
     def events_of(self, deputy: str) -> list[Mark]:
-        """Events of a deputy's own nodes, and those of the run that name it or no deputy."""
+        """Events of a deputy's own nodes, and those of the run about it or about no deputy."""
 
         def concerns(mark: Mark) -> bool:
-            owner, named = mark.node.split("/")[1:-1], set(re.findall(r"\w+", mark.detail))
+            owner = mark.node.split("/")[1:-1]
             if owner:
                 return owner == [deputy]
-            return deputy in named or not named & self.deputies.keys()
+            return mark.subject == deputy or mark.subject not in self.deputies
 
         return [mark for mark in self.events if concerns(mark)]
 
@@ -239,10 +241,11 @@ class RunHistory:
             self._distances.add((names[one], names[other]), np.column_stack((batch["time"] / HOUR, apart)))
 
     def _on_events(self, batch: Batch) -> None:
-        self.counts.update(str(kind) for kind in batch["kind"])
-        rows = zip(batch["time"], batch["kind"], batch["node"], batch["detail"], strict=True)
-        room = MARKS - len(self.events)
-        self.events += [Mark(float(t) / HOUR, str(k), str(n), str(d)) for t, k, n, d in islice(rows, room)]
+        kinds = [kind_name(int(kind)) for kind in batch["kind"]]
+        self.counts.update(kinds)
+        rows = zip(batch["time"], kinds, batch["node"], batch["subject"], batch["detail"], strict=True)
+        for time, kind, *texts in islice(rows, MARKS - len(self.events)):
+            self.events.append(Mark(float(time) / HOUR, kind, *map(str, texts)))
 
 
 def _sort_by_sensor(batch: Batch, fields: Sequence[str], into: ByName) -> None:

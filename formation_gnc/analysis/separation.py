@@ -7,6 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from formation_gnc.analysis.metrics import deputies_of
+from formation_gnc.recording.decode import nanoseconds
 from formation_gnc.recording.reader import Bag
 from formation_gnc.types import Matrix, Vector
 
@@ -56,6 +57,6 @@ def predicted_approach(bag: Bag, kind: str) -> Separation | None:
         index = int(foreseen[kind].argmin())
         distance = float(foreseen[kind][index])
         if nearest is None or distance < nearest.distance:
-            when, other = float(foreseen[f"{kind}_time"][index]), str(foreseen[f"{kind}_other"][index])
-            nearest = Separation(distance, when, (name, other))
+            when, other = 1e-9 * nanoseconds(foreseen, f"{kind}_time")[index], str(foreseen[f"{kind}_neighbour"][index])
+            nearest = Separation(distance, float(when), (name, other))
     return nearest

@@ -6,12 +6,12 @@ what it would have commanded, and nothing answers it. What is not named is taken
 """
 
 import argparse
-import json
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
 
 from formation_gnc.analysis.compare import gnc_topics
+from formation_gnc.parameters import to_json
 from formation_gnc.recording.provenance import parameters_record, provenance
 from formation_gnc.recording.reader import Bag, identical
 from formation_gnc.sil.replay import KINDS, nodes_of, parameters_of, replay
@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
     source = options.recorded.absolute()
     output = options.bag or source.with_name(f"{source.stem}_replay_{datetime.now(UTC):%Y-%m-%d_%H-%M-%S}")
     flown = {
-        parameters_record(node): {name: json.dumps(value) for name, value in values.items()}
+        parameters_record(node): {name: to_json(value) for name, value in values.items()}
         for node, values in parameters.items()
     }
     origin = {"replay": {"source": source.name, "nodes": ", ".join(parameters)}}

@@ -151,6 +151,7 @@ def _fly_on_graph(scenario: Scenario, bag: Path, console: Console, composed: boo
 
 
 def _fly_in_process(scenario: Scenario, bag: Path, console: Console) -> float:
+    from formation_gnc.parameters import to_json
     from formation_gnc.recording.layout import LAYOUT, foxglove_layout
     from formation_gnc.recording.provenance import parameters_record, provenance
     from formation_gnc.recording.writer import BagWriter
@@ -161,7 +162,7 @@ def _fly_in_process(scenario: Scenario, bag: Path, console: Console) -> float:
     if pace:
         raise ConfigurationError("real_time_factor: has no effect in-process; fly the node graph for a paced run")
     parameters = {
-        parameters_record(node): {name: json.dumps(value) for name, value in values.items()}
+        parameters_record(node): {name: to_json(value) for name, value in values.items()}
         for node, values in scenario.parameters().items()
     }
     origin = {"run": {"scenario": scenario.name, "seed": str(scenario.plant.seed)}}

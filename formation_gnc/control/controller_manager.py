@@ -12,7 +12,7 @@ from formation_gnc.control.registry import ALGORITHMS
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight.module import Configuration, FlightModule, ModuleParameters
 from formation_gnc.parameters import parameter
-from formation_gnc.records import NavigationState, Status, Target, Thrust
+from formation_gnc.records import EventKind, NavigationState, Status, Target, Thrust
 
 
 @dataclass(frozen=True)
@@ -124,8 +124,9 @@ class ControllerManager(FlightModule[Any, Controller]):
         if self._predecessor is not None:
             asked = _minus(wanted, self._force.tolist())
             self._withheld = _minus(asked, within(asked, step))
-            detail = f"{self._predecessor} -> {self.parameters.algorithm}: step in force {_newtons(asked)} asked, "
-            self.record(time, "handover", detail + f"{_newtons(_minus(asked, self._withheld))} flown")
+            flown = _newtons(_minus(asked, self._withheld))
+            detail = f"from {self._predecessor}: step in force {_newtons(asked)} asked, {flown} flown"
+            self.log(time, EventKind.HANDOVER, detail, self.parameters.algorithm)
             self._predecessor = None
         else:
             self._withheld = _minus(self._withheld, within(self._withheld, step))
@@ -134,7 +135,7 @@ class ControllerManager(FlightModule[Any, Controller]):
     def _note_fallback(self, time: int, reason: str) -> None:
         """Record when a fallback begins, changes or ends."""
         if reason != self._fallback:
-            self.record(time, "fallback", reason or "over")
+            self.log(time, EventKind.FALLBACK, reason or "over", self.parameters.algorithm)
             self._fallback = reason
 
 

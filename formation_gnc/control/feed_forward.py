@@ -37,7 +37,7 @@ class FeedForward:
             return NO_THRUST, ""
         if not len(target.preview):
             return NO_THRUST, "no feed-forward: the target has no preview"
-        ahead = target.preview_step
+        ahead = target.preview_step / NANOSECONDS
         missing = target.preview[0, 3:] - self._free(estimate, target.relative_state, ahead)[3:]
         acceleration: Vector = self._thrust_over(ahead) @ missing
         return acceleration, ""

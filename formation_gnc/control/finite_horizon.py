@@ -318,7 +318,7 @@ def target_after(target: Target, duration: float, model: RelativeModel) -> Vecto
     Between two states of the preview it is the cubic through their positions and velocities. The model's time
     zero is the target's.
     """
-    step, count = target.preview_step, len(target.preview)
+    step, count = target.preview_step / NANOSECONDS, len(target.preview)
     knots = np.vstack([target.relative_state[None], target.preview.reshape(-1, 6)])
     index = min(int(duration / step), count) if count else 0
     rest = duration - index * step

@@ -320,9 +320,9 @@ class ModelPredictiveController(Controller):
     @staticmethod
     def _dark(time: int, step: int, steps: int, target: Target) -> NDArray[np.bool_]:
         """(steps,) whether any part of each step (ns) from a time (ns) is in a foreseen eclipse."""
-        begin = (time + step * np.arange(steps)[:, None]) / NANOSECONDS
-        end = begin + step / NANOSECONDS
-        dark: NDArray[np.bool_] = np.any((begin < target.eclipse[:, 1]) & (end > target.eclipse[:, 0]), axis=1)
+        begin = time + step * np.arange(steps)[:, None]
+        end = begin + step
+        dark: NDArray[np.bool_] = np.any((begin < target.eclipses[:, 1]) & (end > target.eclipses[:, 0]), axis=1)
         return dark
 
     def _follow(self, time: int, reason: str) -> Command | None:
@@ -380,7 +380,7 @@ class ModelPredictiveController(Controller):
         """Scaled gradient at no thrust, and its cost."""
         horizon = self._parameters.horizon
         now = estimate.relative_state - target.relative_state
-        if not len(target.preview) or abs(target.preview_step - self._parameters.step) > 1e-9:
+        if not len(target.preview) or target.preview_step != self._step_ns:
             # The target moves freely: so does the error, from the error of now.
             return programme.gradient_of_state @ now, float(now @ programme.cost_of_state @ now)
         goal = np.empty((horizon, 6))
@@ -436,7 +436,7 @@ class ModelPredictiveController(Controller):
         """
         parameters, horizon = self._parameters, self._parameters.horizon
         data: Vector = self._rows.data.copy()
-        others = np.vstack([target.others, np.zeros((int(parameters.keep_out_chief), 6))])
+        others = np.vstack([target.neighbours, np.zeros((int(parameters.keep_out_chief), 6))])
         if not len(others):
             data[self._keep_out_entries], lower[-horizon:] = 0.0, -np.inf
             return data

@@ -1,10 +1,9 @@
 """A part of a satellite's software whose parameters change in flight, at a tick."""
 
 import math
-import re
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,8 +11,8 @@ import yaml
 
 from formation_gnc.common import CommonParameters
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.parameters import change, dump, parameter, read_yaml
-from formation_gnc.records import Event
+from formation_gnc.parameters import change, dump, parameter, read_yaml, to_json
+from formation_gnc.records import Event, EventKind, ParameterChange
 from formation_gnc.types import NANOSECONDS
 
 
@@ -138,7 +137,7 @@ class FlightModule[P: ModuleParameters, D](ABC):
             except ConfigurationError as rejection:
                 self._changes.clear()
                 self._start()
-                self.record(time, "rejected", str(rejection))
+                self.log(time, EventKind.REJECTED, str(rejection))
         self._time = time
         while self.foreseen and self.foreseen[0][0] <= time:
             (_, due), *later = self.foreseen
@@ -157,7 +156,7 @@ class FlightModule[P: ModuleParameters, D](ABC):
             if changed != due.parameters or any(at <= time for at, _ in due.plan):
                 due = self._design_from(self.parameters, due.changes)
         except ConfigurationError as rejection:  # only now, together with what was changed since it was prepared
-            self.record(time, "rejected", str(rejection))
+            self.log(time, EventKind.REJECTED, str(rejection))
             return False
         self._swap(time, due)
         return True
@@ -167,15 +166,30 @@ class FlightModule[P: ModuleParameters, D](ABC):
         if "schedule" in new.changes:
             self.foreseen = new.plan
         self.activate(old, new)
-        before = dump(old.parameters)
-        detail = ", ".join(
-            f"{name}: {text_of(before[name])} -> {text_of(value)}" for name, value in new.changes.items()
-        )
-        self.record(time, "parameters", detail)
+        before, after = dump(old.parameters), dump(new.parameters)
+        changes = [ParameterChange(name, to_json(before[name]), to_json(after[name])) for name in new.changes]
+        detail = ", ".join(f"{name}: {_text(before[name])} -> {_text(after[name])}" for name in new.changes)
+        self.log(time, EventKind.PARAMETERS, detail, changes=changes)
 
-    def record(self, time: int, kind: str, detail: str) -> None:
-        """Note an event of this part, to be published with the tick's output."""
-        self.events.append(Event(time, time // self.parameters.tick_ns, self.name, kind, detail))
+    def log(
+        self,
+        time: int,
+        kind: EventKind,
+        detail: str = "",
+        subject: str = "",
+        changes: Iterable[ParameterChange] = (),
+    ) -> None:
+        """Log an event, to be published with the tick's output.
+
+        Args:
+            time: from which it holds, ns.
+            kind: what happened.
+            detail: one line for people; nothing is read from it.
+            subject: what it is about, such as a law, sensor or formation.
+            changes: of parameters.
+        """
+        tick = time // self.parameters.tick_ns
+        self.events.append(Event(time, tick, self.name, kind, subject, list(changes), detail))
 
     def take_events(self) -> list[Event]:
         """The events noted since they were last taken."""
@@ -198,23 +212,5 @@ def scheduled(entry: str) -> tuple[int, dict[str, Any]]:
     return at, {str(name): value for name, value in changes.items()}
 
 
-def text_of(value: Any) -> str:
-    """A parameter's value as events tell it."""
-    return str(list(value)) if isinstance(value, tuple) else str(value)
-
-
-_TEXT = r"""(?:'(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*"|[^'"])*?"""
-_CHANGE = re.compile(rf"([\w.]+): {_TEXT} -> ({_TEXT})(?:$|, (?=[\w.]+: {_TEXT} -> ))")
-
-
-def changes_told(detail: str) -> dict[str, str]:
-    """New values, as text, by name, of the detail of an event of kind `parameters`: the inverse of
-    `name: old -> new, name: old -> new`, where what is in quotes may look like that too.
-
-    Raises:
-        ConfigurationError: there are none.
-    """
-    changes: dict[str, str] = dict(_CHANGE.findall(detail))
-    if not changes:
-        raise ConfigurationError(f"event {detail!r}: names no parameter that could be changed again")
-    return changes
+def _text(value: Any) -> str:
+    return value if isinstance(value, str) else to_json(value)

@@ -20,8 +20,8 @@ from formation_gnc.guidance.transfer import LONGEST, shortest_time
 from formation_gnc.orbit.eclipse import eclipses
 from formation_gnc.orbit.propagation import ImpactError
 from formation_gnc.parameters import parameter
-from formation_gnc.records import NO_ECLIPSE, NOBODY, NavigationState, Separation, Target
-from formation_gnc.types import NANOSECONDS, Matrix, Vector
+from formation_gnc.records import NO_ECLIPSES, NO_NEIGHBOURS, EventKind, NavigationState, Separation, Target
+from formation_gnc.types import NANOSECONDS, Times, Vector
 
 LARGEST_ERROR = 0.05
 """Error of the target's model in a revolution, as a share of the formation's size, above which it is told."""
@@ -106,7 +106,7 @@ class BaseGuidanceParameters(ModuleParameters):
     )
     preview_steps: int = parameter(0, minimum=0, maximum=10_000, doc="target states given ahead of time")
     preview_step: float = parameter(
-        60.0, unit="s", above=0.0, maximum=LAST_SECOND, doc="time between target states given ahead"
+        60.0, unit="s", minimum=1e-9, maximum=LAST_SECOND, doc="time between target states given ahead"
     )
 
 
@@ -150,7 +150,7 @@ class Guidance(FlightModule[Any, TargetPath]):
 
     def reset(self) -> None:
         """Nothing has been looked for yet, eclipses or others that come near."""
-        self._eclipse, self._eclipse_due = NO_ECLIPSE, NEVER
+        self._eclipses, self._eclipse_due = NO_ECLIPSES, NEVER
         self._predicted, self._warned = NEVER, False
         self._waits_for = ""
         self._known: Mapping[str, NavigationState] = {}
@@ -225,7 +225,7 @@ class Guidance(FlightModule[Any, TargetPath]):
 
     def _let_take_over(self, time: int, due: Configuration[Any, TargetPath]) -> bool:
         if time < self._until and not _are_aside(due.changes):
-            self.record(time, "rejected", self._under_way(self._until))
+            self.log(time, EventKind.REJECTED, self._under_way(self._until))
             return False
         return super()._let_take_over(time, due)
 
@@ -266,10 +266,10 @@ class Guidance(FlightModule[Any, TargetPath]):
             estimate.time,
             self.parameters.formation,
             states[0],
-            self.parameters.preview_step,
+            round(self.parameters.preview_step * NANOSECONDS),
             states[1:],
-            self._coming_eclipse(estimate),
-            np.array([each.relative_state for each in known.values()]) if known else NOBODY,
+            self._coming_eclipses(estimate),
+            np.array([each.relative_state for each in known.values()]) if known else NO_NEIGHBOURS,
         )
         return target, self._predict(estimate, target, list(known))
 
@@ -281,7 +281,7 @@ class Guidance(FlightModule[Any, TargetPath]):
             who = ", ".join(silent) or self._deputy
             if who != self._waits_for:
                 self._waits_for = who
-                self.record(estimate.time, "warning", f"no state of {who}: places stay until there is")
+                self.log(estimate.time, EventKind.WARNING, "no state: places stay until there is", who)
             return
         self._unassigned, self._waits_for = False, ""
         states = np.array([fleet[name].relative_state for name in parameters.fleet])
@@ -294,11 +294,12 @@ class Guidance(FlightModule[Any, TargetPath]):
             name: path_to(parameters, slot, shared.phase)
             for name, slot in zip(parameters.fleet, shared.slots, strict=True)
         }
-        self.record(
+        self.log(
             estimate.time,
-            "assignment",
-            f"{parameters.formation}: place {shared.slots[index]}, phase {shared.phase:.4f} rad, "
+            EventKind.ASSIGNMENT,
+            f"place {shared.slots[index]}, phase {shared.phase:.4f} rad, "
             f"{shared.delta_v[index]:.3g} m/s of the fleet's {sum(shared.delta_v):.3g} m/s",
+            parameters.formation,
         )
 
     def _predict(self, estimate: NavigationState, target: Target, names: list[str]) -> Separation | None:
@@ -322,37 +323,42 @@ class Guidance(FlightModule[Any, TargetPath]):
         warns = min(separation.planned, separation.passive) < parameters.separation_warning
         if warns != self._warned:
             self._warned = warns
-            self.record(estimate.time, "separation", in_words(separation) if warns else "over")
+            nearest = separation.nearest if warns else ""
+            self.log(estimate.time, EventKind.SEPARATION, in_words(separation) if warns else "over", nearest)
         return separation
 
-    def _coming_eclipse(self, estimate: NavigationState) -> Matrix:
-        """Eclipses of the chief, looked for two revolutions ahead in every revolution; of a chief that has no
-        orbit nothing new is known, and the next point of an orbit is the time to look again."""
+    def _coming_eclipses(self, estimate: NavigationState) -> Times:
+        """Eclipses of the chief (N, 2), ns, looked for two revolutions ahead in every revolution.
+
+        A chief without an orbit has none that are new; they are looked for again at the next point.
+        """
         seconds = estimate.time / NANOSECONDS
         if estimate.time >= self._eclipse_due:
             wait = revolution = math.tau / self.parameters.mean_motion
             try:
-                self._eclipse = seconds + eclipses(
+                ahead = eclipses(
                     estimate.chief_state,
                     2.0 * revolution,
                     revolution / ECLIPSE_STEPS,
                     self.parameters.epoch + seconds,
                 )
+                self._eclipses = estimate.time + np.rint(ahead * NANOSECONDS).astype(np.int64)
             except ImpactError:  # or a state that is not finite
                 wait /= ECLIPSE_STEPS
             self._eclipse_due = estimate.time + round(wait * NANOSECONDS)
-        while len(self._eclipse) and self._eclipse[0, 1] <= seconds:
-            self._eclipse = self._eclipse[1:]
-        return self._eclipse
+        while len(self._eclipses) and self._eclipses[0, 1] <= estimate.time:
+            self._eclipses = self._eclipses[1:]
+        return self._eclipses
 
     def _tell_of_the_model(self, time: int) -> None:
         error, size = self.configuration.design.error()
         if error > LARGEST_ERROR * size:
-            self.record(
+            self.log(
                 time,
-                "warning",
-                f"{self.parameters.formation} in model {self.parameters.model}: off by {error:.3g} m in "
-                f"the first revolution, at {size:.3g} m from the chief",
+                EventKind.WARNING,
+                f"in model {self.parameters.model}: off by {error:.3g} m in the first revolution, "
+                f"at {size:.3g} m from the chief",
+                self.parameters.formation,
             )
 
     def _tell_of_the_change(self, estimate: NavigationState, target: Vector) -> None:
@@ -364,13 +370,14 @@ class Guidance(FlightModule[Any, TargetPath]):
         soonest = shortest_time(to_go, acceleration, parameters.mean_motion)
         words = f"{soonest:.0f} s" if math.isfinite(soonest) else f"more than {LONGEST} revolutions"
         detail = (
-            f"{self._left} -> {parameters.formation}, place {parameters.slot}: "
+            f"from {self._left} to place {parameters.slot}: "
             f"{np.linalg.norm(to_go[:3]):.0f} m to go, for which the thrusters need {words}"
         )
         if 0.0 < parameters.reconfiguration_time < soonest:
-            self.record(estimate.time, "infeasible", f"{detail}, not {parameters.reconfiguration_time:g} s")
+            kind, detail = EventKind.INFEASIBLE, f"{detail}, not {parameters.reconfiguration_time:g} s"
         else:
-            self.record(estimate.time, "reconfiguration", detail)
+            kind = EventKind.RECONFIGURATION
+        self.log(estimate.time, kind, detail, parameters.formation)
 
 
 @lru_cache(maxsize=16)

@@ -38,24 +38,33 @@ def predict(
         mean_motion: rate of the chief, rad/s.
     """
     time = target.time / NANOSECONDS
-    ahead = target.preview_step * np.arange(len(target.preview) + 1.0)
-    others = path.coast(target.others, time, ahead)
+    ahead = target.preview_step / NANOSECONDS * np.arange(len(target.preview) + 1.0)
+    others = path.coast(target.neighbours, time, ahead)
     for index, name in enumerate(names):
         if name in neighbours:
             others[:, index] = neighbours[name].states(time + ahead)
     planned = np.vstack([target.relative_state, target.preview])[:, None] - others
     later: Vector = np.linspace(0.0, horizon * math.tau / mean_motion, math.ceil(horizon * POINTS) + 1)
-    passive = path.coast(state - target.others, time, later)
+    passive = path.coast(state - target.neighbours, time, later)
     near, far = _nearest(planned, ahead), _nearest(passive, later)
-    return Separation(target.time, near[0], time + near[1], names[near[2]], far[0], time + far[1], names[far[2]])
+    return Separation(
+        target.time,
+        planned=near[0],
+        planned_time=target.time + round(near[1] * NANOSECONDS),
+        planned_neighbour=names[near[2]],
+        passive=far[0],
+        passive_time=target.time + round(far[1] * NANOSECONDS),
+        passive_neighbour=names[far[2]],
+    )
 
 
 def in_words(separation: Separation) -> str:
     """For an event."""
     return (
-        f"{separation.planned:.1f} m from {separation.planned_other} at {separation.planned_time:.0f} s on "
-        f"target, {separation.passive:.1f} m from {separation.passive_other} at "
-        f"{separation.passive_time:.0f} s without thrust"
+        f"{separation.planned:.1f} m from {separation.planned_neighbour} at "
+        f"{separation.planned_time / NANOSECONDS:.0f} s on target, "
+        f"{separation.passive:.1f} m from {separation.passive_neighbour} at "
+        f"{separation.passive_time / NANOSECONDS:.0f} s without thrust"
     )
 
 

@@ -26,22 +26,21 @@ class Rejections:
     def __init__(self) -> None:
         """Nothing yet."""
         self.counts: Counts = np.zeros(len(Rejection), dtype=np.uint32)
-        self._seen: dict[str, int] = {}
-        self._news: list[str] = []
+        self._seen: dict[tuple[str, Rejection], int] = {}
+        self._news: list[tuple[str, str]] = []
 
     def add(self, reason: Rejection, what: str, detail: str = "") -> None:
         """Count a rejection of something, such as a sensor's reading; the 1st, 10th, 100th ... of a kind is
         news."""
         self.counts = self.counts.copy()  # an estimate already holds the old one
         self.counts[reason] += 1
-        subject = f"{what}: {WORDS[reason]}"
-        self._seen[subject] = seen = self._seen.get(subject, 0) + 1
+        self._seen[what, reason] = seen = self._seen.get((what, reason), 0) + 1
         if str(seen).strip("0") == "1":
-            text = f"{subject}, {detail}" if detail else subject
-            self._news.append(text if seen == 1 else f"{text} ({seen} by now)")
+            text = f"{WORDS[reason]}, {detail}" if detail else WORDS[reason]
+            self._news.append((what, text if seen == 1 else f"{text} ({seen} by now)"))
 
-    def news(self) -> list[str]:
-        """What there is to tell since it was last asked for."""
+    def news(self) -> list[tuple[str, str]]:
+        """Subject and detail of what there is to log since it was last asked for."""
         news, self._news = self._news, []
         return news
 

@@ -15,7 +15,7 @@ from formation_gnc.navigation.measurement_checks import Rejections, Screen, cred
 from formation_gnc.navigation.observability import Observability, orbit_period
 from formation_gnc.navigation.process import PROCESS_MODELS, Interval, ProcessModel, process_noise, substeps
 from formation_gnc.parameters import parameter
-from formation_gnc.records import Estimate, EstimateStatus, Measurement, Rejection, Sensor
+from formation_gnc.records import Estimate, EstimateStatus, EventKind, Measurement, Rejection, Sensor
 from formation_gnc.types import NANOSECONDS, Matrix, Vector
 
 CHIEF_DISTANCE, CHIEF_SPEED = 100.0, 1.0
@@ -306,8 +306,8 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         except (ArithmeticError, ValueError) as error:  # LinAlgError is a ValueError
             self._give_up(measurement.time, f"{type(error).__name__}: {error}")
             estimate = None
-        for text in self._rejections.news():
-            self.record(measurement.time, "rejected", text)
+        for subject, detail in self._rejections.news():
+            self.log(measurement.time, EventKind.REJECTED, detail, subject)
         return estimate
 
     def _acquires(self, measurement: Measurement) -> bool | None:
@@ -357,7 +357,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
             told=measurement.chief_state,
             last_reading=measurement.time,
         )
-        self.record(measurement.time, "acquired", "filter started from an acquisition fix")
+        self.log(measurement.time, EventKind.ACQUIRED, "filter started from an acquisition fix")
         self._report_unobservable(flight)
         return flight
 
@@ -367,9 +367,9 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
 
     def _report_unobservable(self, flight: Flight) -> None:
         words = flight.observability.words
-        self.record(
+        self.log(
             flight.time,
-            "observability",
+            EventKind.OBSERVABILITY,
             f"unobservable direction: {words}" if words else "everything is observable",
         )
 
@@ -426,7 +426,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
             state = kernels.relative_to(flight.chief, flight.filter.x, flight.told)
             flight.filter = FILTERS[self.parameters.filter](state, flight.filter.P)
             flight.chief, flight.chief_known = flight.told, True
-            self.record(flight.time, "chief", "ephemeris goes on from elsewhere: taken up again")
+            self.log(flight.time, EventKind.CHIEF, "ephemeris goes on from elsewhere: taken up again")
             return
         self._rejections.add(Rejection.CHIEF, "chief ephemeris")
 
@@ -442,7 +442,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
                 return self._update(self._acquire(measurement), measurement, EstimateStatus.ACQUIRED)
             if verdict is Verdict.INFLATE:
                 flight.filter.P = flight.filter.P * factor
-                self.record(measurement.time, "diverged", f"covariance inflated by {factor:.3g}")
+                self.log(measurement.time, EventKind.DIVERGED, f"covariance inflated by {factor:.3g}")
                 status = EstimateStatus.DIVERGED
         if status is EstimateStatus.TRACKING:
             if not flight.chief_known:
@@ -518,7 +518,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
     def _give_up(self, time: int, why: str) -> None:
         """Lose the state: without an estimate the tick is missed, and the next measurement has a fix."""
         self._flight = None
-        self.record(time, "lost", f"{why}: waiting for an acquisition fix")
+        self.log(time, EventKind.LOST, f"{why}: waiting for an acquisition fix")
 
 
 def _follow(chief: Vector, told: Vector, over: StepConstants) -> tuple[Vector, bool]:

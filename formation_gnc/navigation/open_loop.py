@@ -10,12 +10,11 @@ import numpy as np
 
 from formation_gnc.analysis.metrics import deputies_of
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.flight.module import changes_told
 from formation_gnc.navigation.navigation_filter import NavigationFilter, NavigationParameters
-from formation_gnc.parameters import leaves, load, read_yaml
+from formation_gnc.parameters import leaves, load
 from formation_gnc.recording.provenance import parameters_record
 from formation_gnc.recording.reader import Bag
-from formation_gnc.records import Estimate, Measurement, Rejection
+from formation_gnc.records import Estimate, EventKind, Measurement, Rejection
 from formation_gnc.types import NANOSECONDS, Matrix, Vector
 
 
@@ -130,8 +129,8 @@ def _changes_in_flight(bag: Bag, node: str, fixed: frozenset[str]) -> dict[int, 
     if "/events" not in bag.topics:
         return changes
     for _, event, _ in bag.decoded(["/events"]):
-        if event.node == node and event.kind == "parameters":
-            found = {name: read_yaml(text) for name, text in changes_told(event.detail).items() if name not in fixed}
+        if event.node == node and event.kind == EventKind.PARAMETERS:
+            found = {each.name: loads(each.new_value) for each in event.changes if each.name not in fixed}
             if found:
                 changes.setdefault(_stamp(event), []).append(found)
     return changes

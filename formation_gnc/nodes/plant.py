@@ -9,7 +9,7 @@ from rclpy._rclpy_pybind11 import NodeNameNonExistentError
 from rosgraph_msgs.msg import Clock
 
 from formation_gnc.plant.plant import Plant, PlantParameters
-from formation_gnc.records import Event, Measurement, Thrust, Truth
+from formation_gnc.records import Event, EventKind, Measurement, Thrust, Truth
 from formation_gnc.transport import topics
 from formation_gnc.transport.conversion import codec
 from formation_gnc.transport.node import ConfiguredNode, asked_to_stop, run
@@ -113,16 +113,17 @@ class PlantNode(ConfiguredNode):
             return
         tick, time = plant.tick, plant.time
         for name in plant.step(self._forces):
-            detail = f"{name} {self._reason_of_miss(name)}: no thrust"
-            self.get_logger().warning(f"tick {tick}: miss: {detail}")
-            self._tell_event(time, tick, "miss", detail)
+            detail = f"{self._reason_of_miss(name)}: no thrust"
+            miss = Event(time, tick, self.get_fully_qualified_name(), EventKind.MISS, name, detail=detail)
+            self.get_logger().warning(str(miss))
+            self._events(miss)
             self._misses += 1
         for event in plant.take_events():
-            self.get_logger().info(f"tick {event.tick}: {event.kind}: {event.detail}")
+            self.get_logger().info(str(event))
             self._events(event)
         if plant.finished:
             detail = f"{plant.tick} ticks flown, {self._misses} missed"
-            self._tell_event(plant.time, plant.tick, "end", detail)
+            self._events(Event(plant.time, plant.tick, self.get_fully_qualified_name(), EventKind.END, detail=detail))
             self._report("finished")
         else:
             self._publish_tick()
@@ -146,9 +147,6 @@ class PlantNode(ConfiguredNode):
         self._truth(self.plant.truth())
         self._clock.clock.sec, self._clock.clock.nanosec = divmod(self.plant.time, NANOSECONDS)
         self._tell_time.publish(self._clock)
-
-    def _tell_event(self, time: int, tick: int, kind: str, detail: str) -> None:
-        self._events(Event(time, tick, self.get_fully_qualified_name(), kind, detail))
 
     def _on_recorded(self, message: Clock) -> None:
         self._recorded = message.clock.sec * NANOSECONDS + message.clock.nanosec

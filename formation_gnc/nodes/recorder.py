@@ -1,6 +1,5 @@
 """The recorder node: every topic, byte for byte, into an MCAP bag."""
 
-import json
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,13 +17,13 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from formation_gnc.common import CommonParameters
-from formation_gnc.parameters import parameter
+from formation_gnc.parameters import parameter, to_json
 from formation_gnc.recording.layout import LAYOUT, foxglove_layout
 from formation_gnc.recording.loss import LossCounter
 from formation_gnc.recording.provenance import LOST, parameters_record, provenance
 from formation_gnc.recording.snapshot import Snapshot
 from formation_gnc.recording.writer import FLUSH_INTERVAL, BagWriter, Split
-from formation_gnc.records import Event
+from formation_gnc.records import Event, EventKind
 from formation_gnc.transport import topics
 from formation_gnc.transport.conversion import codec
 from formation_gnc.transport.node import ConfiguredNode, asked_to_stop, run
@@ -220,8 +219,8 @@ class RecorderNode(ConfiguredNode):
     def _hear_event(self, data: bytes) -> None:
         event = self._read_event(data)
         self._told = event.time
-        if event.kind == "miss":
-            self._missed[f"/{event.detail.split()[0]}"] = event.time
+        if event.kind == EventKind.MISS:
+            self._missed[f"/{event.subject}"] = event.time
 
     def _forget_progress(self) -> None:
         self._told = -1
@@ -270,7 +269,7 @@ class RecorderNode(ConfiguredNode):
     def _put_on_record(self, node: str, record_name: str, values: dict[str, Any]) -> None:
         """Write parameters at once, so that a bag that is cut short can be flown again."""
         here = ("bag",) if node == self.get_fully_qualified_name() else ()  # where, not how, it was recorded
-        recorded = {name: json.dumps(value) for name, value in values.items() if name not in here}
+        recorded = {name: to_json(value) for name, value in values.items() if name not in here}
         self.bag.add_metadata(record_name, recorded)
         if record_name == parameters_record("/plant"):
             self.bag.add_metadata("run", {"scenario": self._scenario, "seed": str(values.get("seed", ""))})

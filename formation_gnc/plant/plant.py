@@ -21,7 +21,7 @@ from formation_gnc.parameters import parameter, per_name
 from formation_gnc.plant.sensors import Sensors, SensorSuite
 from formation_gnc.plant.thrusters import NO_FORCE, Denial, Thruster, ThrusterParameters, ThrusterState
 from formation_gnc.randomness import generator
-from formation_gnc.records import Event, Measurement, SatelliteTruth, Truth
+from formation_gnc.records import Event, EventKind, Measurement, SatelliteTruth, Truth
 from formation_gnc.types import NANOSECONDS, Vector
 
 
@@ -225,8 +225,10 @@ class Plant:
         denied = tuple(reason for reason in denied if reason is not Denial.NOT_FINITE)
         if denied != satellite.denied:
             satellite.denied = denied
-            detail = f"{satellite.name}: {', '.join(denied) or 'as commanded again'}"
-            self._events.append(Event(self.time, self.tick, "/plant", "thrusters", detail))
+            detail = ", ".join(denied) or "as commanded again"
+            self._events.append(
+                Event(self.time, self.tick, "/plant", EventKind.THRUSTERS, satellite.name, detail=detail)
+            )
 
     def take_events(self) -> list[Event]:
         """The events noted since they were last taken."""

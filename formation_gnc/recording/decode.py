@@ -1,7 +1,7 @@
 """From CDR bytes to arrays and typed messages, by the definition that the bag itself carries."""
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 
 from formation_gnc.errors import ConfigurationError
+from formation_gnc.types import NANOSECONDS
 
 _NUMPY = {
     "bool": "?",
@@ -173,6 +174,12 @@ def installed_type(name: str) -> MessageType:
     from formation_gnc.recording.schema import schema_text  # here alone, so that reading a bag needs no ROS
 
     return MessageType(name, schema_text(name).encode(), "ros2msg")
+
+
+def nanoseconds(arrays: Mapping[str, NDArray[Any]], field: str) -> NDArray[np.int64]:
+    """Times or durations of a field in what `MessageType.arrays` returns, ns."""
+    times: NDArray[np.int64] = arrays[f"{field}.sec"].astype(np.int64) * NANOSECONDS + arrays[f"{field}.nanosec"]
+    return times
 
 
 @dataclass(frozen=True)

@@ -18,14 +18,14 @@ from typing import Any
 
 from formation_gnc.control.controller_manager import ControllerManager, ControllerParameters
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.flight.module import FlightModule, changes_told, text_of
+from formation_gnc.flight.module import Configuration, FlightModule
 from formation_gnc.flight.synchronizer import StampSynchronizer
 from formation_gnc.guidance.guidance import Guidance, GuidanceParameters
 from formation_gnc.navigation.navigation_filter import NavigationFilter, NavigationParameters
-from formation_gnc.parameters import OWN_OF_ROS, dump, leaves, load, read_yaml
+from formation_gnc.parameters import OWN_OF_ROS, dump, load, to_json
 from formation_gnc.recording.provenance import parameters_record
 from formation_gnc.recording.reader import Bag
-from formation_gnc.records import EstimateStatus, Event, Timing
+from formation_gnc.records import EstimateStatus, Event, EventKind, Timing
 from formation_gnc.sil.runner import Sink
 from formation_gnc.types import NANOSECONDS
 
@@ -88,14 +88,13 @@ class ReplayedPart:
 
     def tick(self, time: int, inputs: list[Any], swaps: list[Event]) -> tuple[tuple[Any, ...], list[Event]]:
         """Outputs, none while there is no state, and events of a tick on which `swaps` were recorded."""
-        due = [foreseen.changes for at, foreseen in self._part.foreseen if at <= time]
-        ours = [{name: text_of(value) for name, value in changes.items()} for changes in due]
+        scheduled = [_new_values(foreseen) for at, foreseen in self._part.foreseen if at <= time]
         for swap in swaps:
-            changes = changes_told(swap.detail)
-            if changes in ours:
-                ours.remove(changes)  # the schedule brings it about by itself
+            changes = {change.name: change.new_value for change in swap.changes}
+            if changes in scheduled:
+                scheduled.remove(changes)  # the schedule brings it about by itself
             else:
-                self._part.commit(self._part.stage(self._typed(changes)))
+                self._part.commit(self._part.stage({name: json.loads(value) for name, value in changes.items()}))
         answer = self._part.on_tick(*inputs)  # type: ignore[attr-defined]
         records = () if answer is None else answer if isinstance(answer, tuple) else (answer,)
         return records, self._part.take_events()
@@ -111,9 +110,11 @@ class ReplayedPart:
         self._heard_last = is_heard
         return is_heard
 
-    def _typed(self, texts: Mapping[str, str]) -> dict[str, Any]:
-        kinds = {leaf.name: leaf.type for leaf in leaves(self.kind.schema, dump(self.parameters))}
-        return {name: text if kinds[name] is str else read_yaml(text) for name, text in texts.items()}
+
+def _new_values(foreseen: Configuration[Any, Any]) -> dict[str, str]:
+    """Values that a scheduled change brings, by name, as its event will have them."""
+    values = dump(foreseen.parameters)
+    return {name: to_json(values[name]) for name in foreseen.changes}
 
 
 def parameters_of(bag: Bag, node: str, start: int | None = None) -> dict[str, Any]:
@@ -212,7 +213,7 @@ def _fly_tick(
             if topic == "/events":
                 event = read(topic, data)
                 if event.node in nodes:
-                    if event.kind == "parameters":
+                    if event.kind == EventKind.PARAMETERS:
                         swaps.setdefault(event.node, []).append(event)
                     continue
             elif topic.endswith("/timing"):
@@ -258,7 +259,7 @@ def _fly_tick(
             said[topic] = record
             sink(topic, record)
         if is_timed:
-            sink(timing, Timing(time, part.node.rpartition("/")[2], perf_counter() - started))
+            sink(timing, Timing(time, part.node.rpartition("/")[2], round((perf_counter() - started) * NANOSECONDS)))
         for event in events:
             sink("/events", event)
 

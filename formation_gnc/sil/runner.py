@@ -9,7 +9,7 @@ from formation_gnc.flight.synchronizer import StampSynchronizer
 from formation_gnc.guidance.guidance import Guidance
 from formation_gnc.navigation.navigation_filter import NavigationFilter
 from formation_gnc.plant.plant import Plant
-from formation_gnc.records import Estimate, Event, Thrust
+from formation_gnc.records import Estimate, Event, EventKind, Thrust
 from formation_gnc.sil.scenario import Scenario
 from formation_gnc.types import Vector
 
@@ -78,7 +78,7 @@ class Run:
                 forces[satellite.name] = thrust.force
         tick, time = self.plant.tick, self.plant.time
         for name in self.plant.step(forces):
-            sink("/events", Event(time, tick, "/plant", "miss", f"{name} gave no answer: no thrust"))
+            sink("/events", Event(time, tick, "/plant", EventKind.MISS, name, detail="no answer: no thrust"))
             self.misses += 1
         for event in self.plant.take_events():
             sink("/events", event)
@@ -92,4 +92,4 @@ class Run:
     def finish(self, sink: Sink) -> None:
         """Say that all ticks are flown."""
         detail = f"{self.plant.tick} ticks flown, {self.misses} missed"
-        sink("/events", Event(self.plant.time, self.plant.tick, "/plant", "end", detail))
+        sink("/events", Event(self.plant.time, self.plant.tick, "/plant", EventKind.END, detail=detail))

@@ -34,10 +34,11 @@ from formation_gnc.flight.module import FlightModule
 from formation_gnc.flight.synchronizer import StampSynchronizer
 from formation_gnc.orbit.propagation import ImpactError
 from formation_gnc.parameters import OWN_OF_ROS, Leaf, dump, leaves, load, read_yaml
-from formation_gnc.records import Event, Timing
+from formation_gnc.records import Event, Record, Timing
 from formation_gnc.transport import topics
 from formation_gnc.transport.bus import IntraProcessBus
 from formation_gnc.transport.conversion import codec, message_type
+from formation_gnc.types import NANOSECONDS
 
 Executor: Any = EventsExecutor
 
@@ -96,13 +97,13 @@ class ConfiguredNode(Node):  # type: ignore[misc]
                 self.undeclare_parameter(leaf.name)
             self.declare_parameter(leaf.name, plain, _descriptor(leaf), ignore_override=True)
 
-    def speak(self, record: type, topic: str) -> Callable[[Any], None]:
+    def speak[T: Record](self, record: type[T], topic: str) -> Callable[[T], None]:
         """A function that publishes a record on a topic."""
         publisher = self.create_publisher(message_type(record), topic, topics.quality())
         encode = codec(record).encode
         return lambda each: publisher.publish(encode(each))
 
-    def listen(self, record: type, topic: str, hear: Callable[[bytes], object]) -> None:
+    def listen(self, record: type[Record], topic: str, hear: Callable[[bytes], object]) -> None:
         """Let `hear` have the latest message of a record on a topic, as it came."""
         quality = topics.quality(topics.LATEST)
         self.create_subscription(message_type(record), topic, hear, quality, raw=True)
@@ -188,11 +189,11 @@ class ModuleNode[P: FlightModule[Any, Any]](ConfiguredNode):
             if service.srv_name.endswith(("/set_parameters", "/set_parameters_atomically")):
                 _answer_from(self._designer, service)
 
-    def say(self, record: type, topic: str) -> Callable[[Any], None]:
+    def say[T: Record](self, record: type[T], topic: str) -> Callable[[T], None]:
         """A function that publishes a record on a topic that parts in the same process may answer."""
         publish, hand_on = self.speak(record, topic), self._bus.speak(topic)
 
-        def say(each: Any) -> None:
+        def say(each: T) -> None:
             publish(each)
             hand_on(each)
 
@@ -201,8 +202,8 @@ class ModuleNode[P: FlightModule[Any, Any]](ConfiguredNode):
     def answer(
         self,
         respond: Callable[..., None],
-        inputs: Mapping[str, type],
-        others: Mapping[str, type] = MappingProxyType({}),
+        inputs: Mapping[str, type[Record]],
+        others: Mapping[str, type[Record]] = MappingProxyType({}),
     ) -> None:
         """Call `respond` once per stamp, when one record of it is there from every input topic.
 
@@ -249,9 +250,9 @@ class ModuleNode[P: FlightModule[Any, Any]](ConfiguredNode):
 
     def _finish_tick(self, time: int, spent: float) -> None:
         """Publish what nobody waits for: the events, and the wall time (s) that the answer took."""
-        self._tell_timing(Timing(time, self._kind, spent))
+        self._tell_timing(Timing(time, self._kind, round(spent * NANOSECONDS)))
         for event in self.part.take_events():
-            self.get_logger().info(f"tick {event.tick}: {event.kind}: {event.detail}")
+            self.get_logger().info(str(event))
             self._tell_event(event)
 
     def _on_set_parameters(self, parameters: Sequence[Parameter]) -> SetParametersResult:

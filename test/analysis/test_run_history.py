@@ -63,8 +63,8 @@ def test_batches_of_all_topics_are_those_of_each(bag: Bag) -> None:
 def test_an_event_concerns_its_deputy_or_everybody(flown: RunHistory) -> None:
     swaps = [mark for mark in flown.events_of("deputy2") if mark.kind == "parameters"]
     assert [mark.node for mark in swaps] == ["/deputy2/controller"]
-    flown.events.append(Mark(0.1, "miss", "/plant", "deputy1 gave no answer: no thrust"))
-    flown.events.append(Mark(0.1, "new", "/fleet", "a kind that nobody foresaw"))
+    flown.events.append(Mark(0.1, "miss", "/plant", "deputy1", "no answer: no thrust"))
+    flown.events.append(Mark(0.1, "new", "/fleet", "", "a kind that nobody foresaw"))
     kinds = {name: {mark.kind for mark in flown.events_of(name)} for name in flown.deputies}
     assert "miss" in kinds["deputy1"]
     assert "miss" not in kinds["deputy2"]

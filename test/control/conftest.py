@@ -5,7 +5,7 @@ import pytest
 
 from formation_gnc.common import CommonParameters, Orbit
 from formation_gnc.control.controller import Vehicle
-from formation_gnc.records import NO_ECLIPSE, NOBODY, NavigationState, Target
+from formation_gnc.records import NO_ECLIPSES, NO_NEIGHBOURS, NavigationState, Target
 from formation_gnc.types import NANOSECONDS, Matrix, Vector
 
 
@@ -38,24 +38,24 @@ def estimate() -> Callable[..., NavigationState]:
 
 @pytest.fixture(scope="session")
 def target() -> Callable[..., Target]:
-    """A target state at a time (s), with or without a preview, eclipses (s) and other satellites."""
+    """A target state at a time (s), with or without a preview, eclipses (s) and neighbours."""
 
     def build(
         state: Vector | None = None,
         time: float = 0.0,
         preview: Vector | None = None,
         step: float = 60.0,
-        eclipse: Matrix = NO_ECLIPSE,
-        others: Matrix = NOBODY,
+        eclipses: Matrix = NO_ECLIPSES,
+        neighbours: Matrix = NO_NEIGHBOURS,
     ) -> Target:
         return Target(
             round(time * NANOSECONDS),
             "leader_follower",
             np.zeros(6) if state is None else np.asarray(state, dtype=float),
-            step,
+            round(step * NANOSECONDS),
             np.empty((0, 6)) if preview is None else preview,
-            eclipse,
-            others,
+            np.rint(eclipses * NANOSECONDS).astype(np.int64),
+            neighbours,
         )
 
     return build

@@ -10,6 +10,7 @@ from formation_gnc.control.controller import Command, Controller
 from formation_gnc.control.controller_manager import ControllerManager, ControllerParameters
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.parameters import load
+from formation_gnc.records import EventKind
 
 VALUES = {"chief.semi_major_axis": 6978100.0, "tick": 10.0, "lqr.thrust": (0.002, 0.002, 0.002)}
 AWAY = np.array([50.0, -20.0, 10.0, 0.0, 0.0, 0.0])
@@ -79,7 +80,7 @@ def test_a_fallback_is_an_event_when_it_begins_changes_and_ends(estimate, target
     pilot = autopilot()
     for tick, state in enumerate([AWAY, np.nan * AWAY, np.nan * AWAY, AWAY, AWAY]):
         pilot.on_tick(estimate(state, 10.0 * tick), target(time=10.0 * tick))
-    events = [(event.tick, event.detail) for event in pilot.take_events() if event.kind == "fallback"]
+    events = [(event.tick, event.detail) for event in pilot.take_events() if event.kind == EventKind.FALLBACK]
     assert events == [(1, "estimate not finite: no thrust"), (3, "over")]
 
 
@@ -97,9 +98,9 @@ def test_a_hand_over_steps_no_further_than_its_bound_and_arrives(share, estimate
     assert (steps <= share * 0.01 * (1.0 + 1e-12)).all()
     assert not forces[59].any()
     np.testing.assert_array_equal(forces[-1], np.clip(status.demand, -0.01, 0.01))
-    events = [event for event in pilot.take_events() if event.kind == "handover"]
+    events = [event for event in pilot.take_events() if event.kind == EventKind.HANDOVER]
     assert [event.tick for event in events] == [1, 60]
-    assert events[0].detail.startswith("lqr -> coast: step in force [")
+    assert (events[0].subject, events[0].detail[:26]) == ("coast", "from lqr: step in force [0")
 
 
 def test_a_rejected_change_leaves_everything_as_it_was(estimate, target):

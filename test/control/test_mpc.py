@@ -13,7 +13,7 @@ from formation_gnc.control.controller_manager import ControllerManager, Controll
 from formation_gnc.control.mpc import ModelPredictiveController, MpcParameters, longest_eclipse
 from formation_gnc.errors import DesignError
 from formation_gnc.parameters import load
-from formation_gnc.records import NO_ECLIPSE, NOBODY
+from formation_gnc.records import NO_ECLIPSES, NO_NEIGHBOURS
 from formation_gnc.relative.chief import KeplerChief
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.tschauner_hempel import TschaunerHempelModel
@@ -26,11 +26,11 @@ def make(common, vehicle, **changes):
     return ModelPredictiveController(dataclasses.replace(ROBERTS, **changes), common, vehicle)
 
 
-def fly(law, model, estimate, target, start, ticks, tick=10.0, mass=100.0, eclipse=NO_ECLIPSE):
+def fly(law, model, estimate, target, start, ticks, tick=10.0, mass=100.0, eclipses=NO_ECLIPSES):
     states, commands = [np.asarray(start, dtype=float)], []
     for index in range(ticks):
         time = index * tick
-        commands.append(law.command(estimate(states[-1], time, mass), target(time=time, eclipse=eclipse)))
+        commands.append(law.command(estimate(states[-1], time, mass), target(time=time, eclipses=eclipses)))
         phi, gamma = model.discretise(time, tick)
         states.append(phi @ states[-1] + gamma @ (commands[-1].force / mass))
     return np.array(states), np.array([command.force for command in commands]), commands
@@ -135,7 +135,7 @@ def test_no_thrust_in_the_eclipses_that_are_foreseen(replan_interval, common, ve
         target,
         [60, 60, 60, 0, 0, 0],
         1700,
-        eclipse=windows,
+        eclipses=windows,
     )
     begins = 10.0 * np.arange(1700)[:, None]
     dark = ((begins < windows[:, 1]) & (begins + 10.0 > windows[:, 0])).any(axis=1)
@@ -150,9 +150,9 @@ def test_an_eclipse_is_met_as_soon_as_it_is_foreseen_and_ends_on_its_tick(common
     law = make(common, vehicle, off_in_eclipse=True, horizon=50, replan_interval=3000.0)
     window, forces = np.array([[300.0, 600.0]]), []
     for tick in range(80):
-        known = window if tick >= 20 else NO_ECLIPSE
+        known = window if tick >= 20 else NO_ECLIPSES
         seen = estimate([60, 60, 60, 0, 0, 0], 10.0 * tick)
-        forces.append(law.command(seen, target(time=10.0 * tick, eclipse=known)).force)
+        forces.append(law.command(seen, target(time=10.0 * tick, eclipses=known)).force)
     assert [bool(force.any()) for force in forces] == [True] * 30 + [False] * 30 + [True] * 20
 
 
@@ -226,13 +226,13 @@ def test_absolute_cost_takes_less_delta_v(common, vehicle, estimate, target):
     assert used["absolute"] < 0.9 * used["quadratic"]
 
 
-def past(law, common, estimate, target, others=NOBODY):
+def past(law, common, estimate, target, others=NO_NEIGHBOURS):
     """Flight from 60 m ahead of the chief to 60 m behind, with others in free flight: states of all."""
     model, aim = HillModel(common.mean_motion), np.array([0.0, -60.0, 0.0, 0.0, 0.0, 0.0])
     state, states, theirs = np.array([0.0, 60.0, 1.0, 0.0, 0.0, 0.0]), [], []
     for index in range(600):
         time = 10.0 * index
-        command = law.command(estimate(state, time), target(aim, time, others=others))
+        command = law.command(estimate(state, time), target(aim, time, neighbours=others))
         assert not command.fallback
         states.append(state)
         theirs.append(others)
@@ -283,7 +283,7 @@ def test_a_preview_is_followed_as_far_as_it_reaches(common, vehicle, estimate, t
 def test_what_cannot_be_solved_flies_the_last_plan_and_then_lqr(common, vehicle, estimate, target):
     law = make(common, vehicle, off_in_eclipse=True, thrust_rate=1e-6, horizon=50)
     law.activate(Handover(np.full(3, 0.01), "coast"))
-    first = law.command(estimate(OFFSET), target(eclipse=np.array([[350.0, 2000.0]])))
+    first = law.command(estimate(OFFSET), target(eclipses=np.array([[350.0, 2000.0]])))
     # 350 s are too short to bring 10 mN down to none at a micronewton per second
     assert first.fallback.startswith("mpc: primal infeasible")
     assert first.fallback.endswith("no plan, LQR flies")

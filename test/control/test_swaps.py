@@ -7,6 +7,7 @@ import pytest
 
 from formation_gnc.control.controller_manager import ControllerManager, ControllerParameters
 from formation_gnc.parameters import load
+from formation_gnc.records import EventKind
 from formation_gnc.relative.hill import HillModel
 
 VALUES = {
@@ -45,11 +46,11 @@ def test_lqr_to_hinf_to_mpc_and_back_twice(form, share, estimate, target):
     assert (np.abs(forces[at] - forces[at - 1]) <= share * 0.01 * (1.0 + 1e-9)).all()
     assert np.linalg.norm(state[:3]) < 1.0
     events = pilot.take_events()
-    assert [event.tick for event in events if event.kind == "handover"] == [
+    assert [event.tick for event in events if event.kind == EventKind.HANDOVER] == [
         0,
         *(60 * i for i in range(1, len(ROUND))),
     ]
-    assert not [event for event in events if event.kind == "fallback"]
+    assert not [event for event in events if event.kind == EventKind.FALLBACK]
 
 
 def test_designs_in_another_thread_are_the_same_and_touch_nothing(estimate, target):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.guidance.guidance import Guidance, GuidanceParameters, check_places
 from formation_gnc.parameters import load
-from formation_gnc.records import NavigationState, Target
+from formation_gnc.records import EventKind, NavigationState, Target
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.types import NANOSECONDS
 
@@ -65,16 +65,16 @@ def test_the_others_come_with_the_target_in_the_order_of_the_fleet() -> None:
     guide = Guidance("/deputy2/guidance", parameters(slot=1))
     assert guide.others == ("deputy1", "deputy3", "deputy4")
     target, _ = guide.on_tick(estimate(states[1]), estimate(states[0]), None, estimate(states[3]))
-    assert target.others.tolist() == [states[0].tolist(), states[3].tolist()]
+    assert target.neighbours.tolist() == [states[0].tolist(), states[3].tolist()]
     broken, _ = guide.on_tick(
         estimate(states[1], 1.0), estimate(states[0], 1.0), estimate(np.full(6, np.nan), 1.0), None
     )
-    assert broken.others.tolist() == [states[0].tolist()]
+    assert broken.neighbours.tolist() == [states[0].tolist()]
 
 
 def test_alone_there_is_nobody_and_nothing_to_predict() -> None:
     target, separation = Guidance("/deputy1/guidance", parameters(fleet=())).on_tick(estimate(np.ones(6)))
-    assert target.others.shape == (0, 6)
+    assert target.neighbours.shape == (0, 6)
     assert separation is None
 
 
@@ -87,7 +87,7 @@ def test_neighbours_on_a_ring_are_predicted_to_keep_the_side_of_its_square() -> 
     # dx of amplitude sqrt(2)/2, zero four times in two revolutions
     assert separation.passive == pytest.approx(1000.0 * math.sqrt(2.0), rel=2e-3)
     assert separation.planned == pytest.approx(1000.0 * math.sqrt(2.0), rel=2e-3)
-    assert separation.passive_other in ("deputy2", "deputy4")
+    assert separation.passive_neighbour in ("deputy2", "deputy4")
 
 
 def test_a_collision_course_is_found_between_the_points_and_told_once() -> None:
@@ -102,8 +102,8 @@ def test_a_collision_course_is_found_between_the_points_and_told_once() -> None:
     _, separation = guide.on_tick(estimate(behind), estimate(drifting))
     assert separation is not None
     assert separation.passive == pytest.approx(drifting[0], rel=1e-6)  # passes above at that height
-    assert separation.passive_time == pytest.approx(2000.0 / (1.5 * n * drifting[0]), rel=1e-6)
-    assert not [event for event in guide.take_events() if event.kind == "separation"]
+    assert separation.passive_time / NANOSECONDS == pytest.approx(2000.0 / (1.5 * n * drifting[0]), rel=1e-6)
+    assert not [event for event in guide.take_events() if event.kind == EventKind.SEPARATION]
     drifting[0] *= 0.04
     drifting[4] *= 0.04
     drifting[1] = -900.0
@@ -113,10 +113,10 @@ def test_a_collision_course_is_found_between_the_points_and_told_once() -> None:
         _, separation = guide.on_tick(estimate(behind, seconds), estimate(drifting, seconds))
         assert separation is not None
         assert separation.passive < 20.0
-        told += [event.detail for event in guide.take_events() if event.kind == "separation"]
+        told += [event.detail for event in guide.take_events() if event.kind == EventKind.SEPARATION]
     assert len(told) == 1
     guide.on_tick(estimate(behind, 180.0), estimate(ahead, 180.0))
-    assert [event.detail for event in guide.take_events() if event.kind == "separation"] == ["over"]
+    assert [event.detail for event in guide.take_events() if event.kind == EventKind.SEPARATION] == ["over"]
 
 
 @pytest.mark.parametrize("model", ["hill", "j2_mean_motion", "yamanaka_ankersen"])
@@ -131,7 +131,7 @@ def test_all_guidances_of_a_fleet_find_the_same_places_and_the_phase_where_they_
     # on the ring already, and so at home; the rates of J2 make the start a little different
     off = [np.linalg.norm((target.relative_state - state)[:3]) for target, state in zip(targets, states, strict=True)]
     assert max(off) < (1e-2 if model == "hill" else 5.0)
-    assert [event.kind for event in fleet["deputy1"].take_events()] == ["assignment"]
+    assert [event.kind for event in fleet["deputy1"].take_events()] == [EventKind.ASSIGNMENT]
 
 
 def test_places_are_shared_out_again_when_the_schedule_changes_the_formation() -> None:
@@ -144,7 +144,8 @@ def test_places_are_shared_out_again_when_the_schedule_changes_the_formation() -
     assert {target.formation for target in after} == {"three_in_plane_one_out"}
     assert sorted(guide.parameters.slot for guide in fleet.values()) == [0, 1, 2, 3]
     kinds = [event.kind for event in fleet["deputy3"].take_events()]
-    assert kinds == ["assignment", "parameters", "assignment", "reconfiguration"]
+    expected = [EventKind.ASSIGNMENT, EventKind.PARAMETERS, EventKind.ASSIGNMENT, EventKind.RECONFIGURATION]
+    assert kinds == expected
 
 
 def test_with_fuel_who_has_little_left_goes_the_shorter_way() -> None:
@@ -179,9 +180,9 @@ def test_places_stay_until_there_is_a_state_of_everybody() -> None:
     assert guide.parameters.slot == 2
     guide.on_tick(estimate(states[0], 1.0), estimate(states[1], 1.0), None, estimate(states[3], 1.0))
     (event,) = guide.take_events()
-    assert (event.kind, "deputy3" in event.detail) == ("warning", True)
+    assert (event.kind, event.subject) == (EventKind.WARNING, "deputy3")
     guide.on_tick(estimate(states[0], 2.0), *(estimate(state, 2.0) for state in states[1:]))
-    assert [event.kind for event in guide.take_events()] == ["assignment"]
+    assert [event.kind for event in guide.take_events()] == [EventKind.ASSIGNMENT]
     guide.on_tick(estimate(states[0], 3.0), *(estimate(state, 3.0) for state in states[1:]))
     assert guide.take_events() == []
 
@@ -191,12 +192,12 @@ def test_a_state_that_nobody_can_have_is_nobodys(state: Array) -> None:
     guide = Guidance("/deputy1/guidance", parameters(assignment="delta_v", separation_warning=10.0))
     states = on_the_ring(0.0)
     target, separation = guide.on_tick(estimate(state), *map(estimate, states[1:]))
-    assert (separation, len(target.others)) == (None, 3)
+    assert (separation, len(target.neighbours)) == (None, 3)
     others = estimate(state, 1.0), estimate(states[2], 1.0), estimate(states[3], 1.0)
     target, separation = guide.on_tick(estimate(states[0], 1.0), *others)
     assert separation is not None
     assert np.isfinite([separation.planned, separation.passive]).all()
-    assert target.others.tolist() == states[2:].tolist()
+    assert target.neighbours.tolist() == states[2:].tolist()
 
 
 @pytest.mark.parametrize(

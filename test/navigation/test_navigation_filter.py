@@ -25,7 +25,7 @@ from formation_gnc.navigation.observability import (
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import hill_transform, inertial_from_relative
 from formation_gnc.parameters import load
-from formation_gnc.records import Estimate, EstimateStatus, Measurement, Rejection, Sensor
+from formation_gnc.records import Estimate, EstimateStatus, EventKind, Measurement, Rejection, Sensor
 from formation_gnc.sil.monte_carlo import Sample, navigator, nees
 from formation_gnc.sil.monte_carlo import simulate_measurements as fly
 from formation_gnc.types import Vector
@@ -148,7 +148,7 @@ def test_the_estimate_names_the_unobservable_direction_and_follows_it() -> None:
         predicted = predicted_unobservable_direction(sample.measurement.chief_state)
         # 100 m from the chief, rates divided by a mean motion that J2 shifts by a part in a thousand
         assert abs(estimate.unobservable_direction @ predicted) == pytest.approx(1.0, abs=1e-5)
-    told = [event for event in filter.take_events() if event.kind == "observability"]
+    told = [event for event in filter.take_events() if event.kind == EventKind.OBSERVABILITY]
     assert told
 
 
@@ -293,7 +293,7 @@ def test_a_wrong_start_is_recovered_from_by_inflation() -> None:
     estimates = run(filter, samples)
     assert any(each.status == EstimateStatus.DIVERGED for each in estimates)
     assert estimates[-1].status == EstimateStatus.TRACKING
-    assert any(event.kind == "diverged" for event in filter.take_events())
+    assert any(event.kind == EventKind.DIVERGED for event in filter.take_events())
     assert abs(estimates[-1].relative_state[0] - samples[-1].truth[0]) < 20.0
 
 
@@ -398,7 +398,7 @@ def test_what_is_wrong_is_rejected_and_the_rest_is_used(
     counts = np.zeros(len(Rejection), dtype=np.uint32)
     counts[reason] = 1
     np.testing.assert_array_equal(estimate.rejections, counts)
-    assert any(event.kind == "rejected" for event in filter.take_events())
+    assert any(event.kind == EventKind.REJECTED for event in filter.take_events())
     after = filter.on_tick(samples[11].measurement)
     assert after is not None
     assert after.sensor == samples[11].measurement.sensor

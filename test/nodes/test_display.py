@@ -44,7 +44,7 @@ def test_one_transform_after_the_other_leads_to_the_deputys_inertial_position(tr
 
 
 def test_every_deputy_has_its_ball_name_and_trail_and_who_has_a_target_that_too(truth: Truth) -> None:
-    target = Target(TIME, "ring", np.array([1.0, 2.0, 3.0, 0.0, 0.0, 0.0]), 60.0, np.ones((4, 6)))
+    target = Target(TIME, "ring", np.array([1.0, 2.0, 3.0, 0.0, 0.0, 0.0]), 60 * NANOSECONDS, np.ones((4, 6)))
     past = np.array([0.0, -90.0, 30.0])
     drawn = list(markers(truth, {"deputy2": target}, {"deputy1": deque([past])}, 5.0))
     assert {marker.header.frame_id for marker in drawn} == {"hill"}

@@ -79,7 +79,7 @@ def flown(ticks: int, first: int = 0) -> list[Recorded]:
             record("/deputy1/thrust", Thrust(header=header, force=rng.normal(size=3)), stamp_ns),
         ]
         if tick % 25 == 3:
-            event = Event(header=header, tick=tick, node="/plant", kind="miss", detail="zu spät " * (tick % 4))
+            event = Event(header=header, tick=tick, node="/plant", kind=Event.MISS, detail="zu spät " * (tick % 4))
             messages.append(record("/events", event, stamp_ns))
     return messages
 

@@ -8,6 +8,7 @@ from itertools import groupby
 
 import numpy as np
 import pytest
+from builtin_interfaces.msg import Duration
 from formation_gnc_msgs.msg import Event, Measurement, Target
 from hypothesis import given
 from hypothesis import strategies as st
@@ -105,22 +106,22 @@ def test_arrays_equal_what_ros_itself_deserialises(messages) -> None:
             assert np.array_equal(arrays[field][row], getattr(truth, field)), field
 
 
-@given(st.lists(st.builds(Event, node=text, kind=text, detail=text, tick=st.integers(0, 2**64 - 1)), min_size=1))
+@given(st.lists(st.builds(Event, node=text, subject=text, detail=text, tick=st.integers(0, 2**64 - 1)), min_size=1))
 def test_text_of_any_length_comes_back(messages) -> None:
     arrays = installed_type("formation_gnc_msgs/msg/Event").arrays([serialize_message(m) for m in messages])
-    for field in ("node", "kind", "detail", "tick"):
+    for field in ("node", "subject", "detail", "tick"):
         assert arrays[field].tolist() == [getattr(message, field) for message in messages]
 
 
 def test_canonical_bytes_depend_on_the_fields_alone() -> None:
     # What ROS leaves between and after the fields is whatever was in memory; here it is what we put there.
     kind = installed_type("formation_gnc_msgs/msg/Target")
-    data = bytearray(kind.canonical(serialize_message(Target(formation="ring", preview_step=2.0))))
+    data = bytearray(kind.canonical(serialize_message(Target(formation="ring", preview_step=Duration(sec=2)))))
     gap = data.index(b"ring\0") + 5
     assert data[gap : gap + 3] == bytes(3)
     dirty = bytes(data[:gap]) + b"\xaa\xbb\xcc" + bytes(data[gap + 3 :]) + b"left over"
     assert kind.canonical(dirty) == bytes(data)
-    assert kind.message(dirty).preview_step == 2.0
+    assert kind.message(dirty).preview_step.sec == 2
     assert deserialize_message(bytes(data), Target).formation == "ring"
 
 

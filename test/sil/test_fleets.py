@@ -11,7 +11,7 @@ from formation_gnc.analysis.compare import gnc_topics
 from formation_gnc.analysis.separation import minimum_separation
 from formation_gnc.cli import main
 from formation_gnc.recording.reader import Bag, identical
-from formation_gnc.records import Event, Truth
+from formation_gnc.records import Event, EventKind, Truth
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import find_scenario, load_scenario
 from formation_gnc.transport.launcher import Report, fly_graph
@@ -48,7 +48,7 @@ def test_all_arrive_and_none_comes_near_another(scenario: str, tick: float) -> N
     nearest = minimum_separation(np.arange(len(truths)), positions, list(targets))
     assert nearest is not None
     assert nearest.distance > 300.0  # measured: 338 m and 341 m, on the way
-    assert [event.kind for event in events].count("reconfiguration") == len(targets)
+    assert [event.kind for event in events].count(EventKind.RECONFIGURATION) == len(targets)
 
 
 def test_the_scenario_puts_four_on_four_places_with_one_change_each() -> None:
@@ -85,18 +85,18 @@ def test_a_fleet_flies_the_same_bits_on_the_graph_composed_in_process_and_again(
         assert identical(graph, bags[other], topics) == []
     events = graph.arrays("/events")
     kinds = events["kind"].tolist()
-    assert kinds.count("assignment") == 8  # at the start and at the change, by each for itself
-    assert kinds.count("reconfiguration") == 4
+    assert kinds.count(EventKind.ASSIGNMENT) == 8  # at the start and at the change, by each for itself
+    assert kinds.count(EventKind.RECONFIGURATION) == 4
     places = [
         detail.split("place ")[1].split(",")[0]
         for detail, kind, tick in zip(events["detail"].tolist(), kinds, events["tick"].tolist(), strict=True)
-        if kind == "assignment" and tick == 40
+        if kind == EventKind.ASSIGNMENT and tick == 40
     ]
     assert sorted(places) == ["0", "1", "2", "3"]
-    assert graph.arrays("/deputy1/target")["others"].shape == (120, 18)
+    assert graph.arrays("/deputy1/target")["neighbours.2.velocity"].shape == (120, 3)
     assert main(["replay", str(graph.path), "--bag", str(tmp_path / "again")]) == 0
     assert capsys.readouterr().out.splitlines()[-1] == "identical on every GNC topic"
-    assert Bag(tmp_path / "again").arrays("/events")["kind"].tolist().count("reconfiguration") == 4
+    assert Bag(tmp_path / "again").arrays("/events")["kind"].tolist().count(EventKind.RECONFIGURATION) == 4
 
 
 @pytest.mark.sil
@@ -132,7 +132,7 @@ def test_a_fleet_in_flight_is_told_of_another_formation_and_changes_at_one_tick(
         assert formations == ["tetrahedral"] * at + ["three_in_plane_one_out"] * (600 - at)
     events = bag.arrays("/events")
     kinds = list(zip(events["kind"].tolist(), events["tick"].tolist(), strict=True))
-    assert kinds.count(("assignment", at)) == 4
+    assert kinds.count((EventKind.ASSIGNMENT, at)) == 4
     # what was told in flight is flown again at its tick
     assert main(["replay", str(bag.path), "--bag", str(tmp_path / "again")]) == 0
     assert capsys.readouterr().out.splitlines()[-1] == "identical on every GNC topic"
@@ -150,8 +150,8 @@ def test_eight_fly_composed_to_the_bits_of_the_runner_without_a_miss(sil: Callab
     assert {f"/deputy{k}/{topic}" for k in range(1, 9) for topic in ("target", "separation")} < set(topics)
     assert identical(*bags, topics) == []
     kinds = bags[0].arrays("/events")["kind"].tolist()
-    assert (kinds.count("assignment"), kinds.count("miss")) == (8, 0)
-    assert bags[0].arrays("/deputy1/target")["preview"].shape == (60, 30 * 6)
+    assert (kinds.count(EventKind.ASSIGNMENT), kinds.count(EventKind.MISS)) == (8, 0)
+    assert bags[0].arrays("/deputy1/target")["preview.29.position"].shape == (60, 3)
 
 
 @pytest.mark.sil

@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +17,7 @@ import yaml
 from formation_gnc.cli import main
 from formation_gnc.control.registry import ALGORITHMS
 from formation_gnc.recording.reader import Bag, identical
+from formation_gnc.records import EventKind
 
 from .conftest import GNC_TOPICS, PARTS, PATIENCE, Desk, Sil, set_parameter, wait_until
 
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.sil
 StartSil = Callable[..., Sil]
 
 
-def events(bag: Path, kind: str) -> list[tuple[int, str]]:
+def events(bag: Path, kind: EventKind) -> list[tuple[int, str]]:
     """Ticks and details of the events of one kind in a bag."""
     recorded = Bag(bag).arrays("/events")
     return [
@@ -61,7 +61,7 @@ def test_nodes_started_by_hand_in_any_order_fly_and_swap_the_law_in_flight(desk:
 
     recorded = Bag(bag)
     assert {recorded.topics[topic].count for topic in GNC_TOPICS} == {600}, "no message missed or repeated"
-    ((tick, detail),) = events(bag, "parameters")
+    ((tick, detail),) = events(bag, EventKind.PARAMETERS)
     assert detail == "algorithm: lqr -> coast"
     status, thrust = recorded.arrays("/deputy1/status"), recorded.arrays("/deputy1/thrust")
     assert list(status["algorithm"]) == ["lqr"] * tick + ["coast"] * (600 - tick)
@@ -101,14 +101,14 @@ def test_two_rounds_of_laws_under_load_miss_no_tick_and_step_no_further_than_the
         assert terminal.wait() == 0, terminal.text
 
     recorded = Bag(bag)
-    assert events(bag, "miss") == []
-    assert events(bag, "fallback") == []
+    assert events(bag, EventKind.MISS) == []
+    assert events(bag, EventKind.FALLBACK) == []
     thrust, status = recorded.arrays("/deputy1/thrust"), recorded.arrays("/deputy1/status")
     ticks = len(thrust["stamp_ns"])
     assert np.array_equal(thrust["stamp_ns"], np.arange(ticks) * 1_000_000_000)
     assert ticks >= recorded.topics["/truth"].count - 1, "the plant may be stopped within a tick"
-    handovers = events(bag, "handover")
-    assert [detail.split(":")[0] for _, detail in handovers] == [f"{old} -> {new}" for old, new in pairwise(laws)]
+    handovers = events(bag, EventKind.HANDOVER)
+    assert [detail.split(":")[0] for _, detail in handovers] == [f"from {law}" for law in laws[:-1]]
     at = [tick for tick, _ in handovers]
     assert list(status["algorithm"]) == [
         law for law, begin, end in zip(laws, [0, *at], [*at, ticks], strict=True) for _ in range(begin, end)
@@ -139,7 +139,7 @@ def test_a_node_killed_and_started_again_rejoins_and_the_log_shows_the_gap_and_r
     assert plant.wait() == 0
     desk.land()
 
-    misses = events(bag, "miss")
+    misses = events(bag, EventKind.MISS)
     assert misses
     assert misses[0][1].startswith("deputy1 did not answer within 0.5 s")
     recorded = Bag(bag)
@@ -147,7 +147,7 @@ def test_a_node_killed_and_started_again_rejoins_and_the_log_shows_the_gap_and_r
     assert answered == set(range(900)) - {tick for tick, _ in misses}
     assert 899 in answered
     # the restarted filter started from a fix and is consistent: the whole error is inside what it believes
-    acquired = [tick for tick, _ in events(bag, "acquired")]
+    acquired = [tick for tick, _ in events(bag, EventKind.ACQUIRED)]
     assert len(acquired) >= 2
     assert misses[0][0] < acquired[-1] < 900
     estimate, truth = recorded.arrays("/deputy1/estimate"), recorded.arrays("/truth")

@@ -26,6 +26,7 @@ from formation_gnc.recording import Bag
 from formation_gnc.recording.layout import LAYOUT
 from formation_gnc.recording.provenance import LOST
 from formation_gnc.recording.recover import PARTLY_LOST, recover
+from formation_gnc.records import EventKind
 from formation_gnc.transport import topics
 from formation_gnc.types import NANOSECONDS
 
@@ -126,7 +127,7 @@ def test_a_recorder_reports_the_end_of_the_flight(desk: Desk) -> None:
 
 def test_the_plant_stays_until_a_recorder_has_its_end(desk: Desk) -> None:
     with user(desk) as (node, executor):
-        told: list[str] = []
+        told: list[int] = []
         node.create_subscription(Event, topics.EVENTS, lambda event: told.append(event.kind), topics.quality())
         publisher = node.create_publisher(Clock, topics.RECORDED, topics.quality(topics.LATEST))
 
@@ -142,7 +143,7 @@ def test_the_plant_stays_until_a_recorder_has_its_end(desk: Desk) -> None:
 
         def ended() -> bool:
             executor.spin_once(timeout_sec=0.0)
-            return "end" in told
+            return EventKind.END in told
 
         wait_until(ended, "the end of the flight")
         with pytest.raises(subprocess.TimeoutExpired):
@@ -159,8 +160,9 @@ import rclpy
 from formation_gnc_msgs import msg
 from rosgraph_msgs.msg import Clock
 
-from formation_gnc.transport import topics
 from formation_gnc.nodes.recorder import RecorderNode
+from formation_gnc.records import EventKind
+from formation_gnc.transport import topics
 
 rclpy.init(args=sys.argv)
 recorder, user = RecorderNode(), rclpy.create_node("user")
@@ -190,8 +192,8 @@ def deputy(*stamps, kinds=(msg.Estimate, msg.Target, msg.Thrust)):
             tell(kind, f"/deputy1/{kind.__name__.lower()}", stamp)
 
 
-def event(kind, stamp, detail):
-    tell(msg.Event, "/events", stamp, kind=kind, detail=detail)
+def event(kind, stamp, subject=""):
+    tell(msg.Event, "/events", stamp, kind=kind, subject=subject)
 
 
 def progress(expected):
@@ -207,17 +209,17 @@ deputy(*range(5))
 progress(4)
 deputy(*range(5, 11), kinds=(msg.Estimate, msg.Thrust))
 progress(4)  # the thrust says that there was a target
-event("miss", 9, "deputy1 did not answer within 0.5 s: no thrust")
+event(EventKind.MISS, 9, "deputy1")
 progress(9)
 deputy(*range(5, 11), kinds=(msg.Target,))
 progress(10)
-event("end", 11, "11 ticks flown, 1 missed")
+event(EventKind.END, 11)
 progress(11)
 plant(0, 1)  # a new run
 progress(-1)
 deputy(0)
 progress(0)
-event("end", 2, "2 ticks flown, 0 missed")
+event(EventKind.END, 2)
 deputy(1)
 progress(2)
 """
@@ -251,6 +253,7 @@ from formation_gnc_msgs.msg import Event
 
 from formation_gnc.transport import node as shell, topics
 from formation_gnc.nodes.recorder import QUIET, RecorderNode, record
+from formation_gnc.records import EventKind
 
 rclpy.init(args=sys.argv)
 recorder, user = RecorderNode(), rclpy.create_node("user")

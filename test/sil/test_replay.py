@@ -17,6 +17,7 @@ from std_srvs.srv import SetBool, Trigger
 from formation_gnc.analysis.compare import gnc_topics
 from formation_gnc.cli import main
 from formation_gnc.recording.reader import Bag, identical
+from formation_gnc.records import EventKind
 from formation_gnc.sil.scenario import find_scenario
 
 from .conftest import GNC_TOPICS, PARTS, PATIENCE, Desk, Sil, has_messages, wait_until
@@ -35,7 +36,7 @@ def test_an_unchanged_replay_of_a_graph_run_gives_the_recorded_bits(
     assert run.finish()[0] == 0
     assert main(["replay", str(run.bag), "--bag", str(tmp_path / "again")]) == 0
     recorded, again = Bag(run.bag), Bag(tmp_path / "again")
-    assert list(again.arrays("/events")["kind"]).count("parameters") == 2
+    assert list(again.arrays("/events")["kind"]).count(EventKind.PARAMETERS) == 2
     assert again.topics["/deputy1/timing"].count == 900, "of every part at every tick"
     assert identical(recorded, again, gnc_topics(recorded)) == []
 

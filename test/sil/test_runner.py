@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from formation_gnc.records import EventKind, ParameterChange
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
 from formation_gnc.transport.conversion import to_cdr
@@ -126,8 +127,9 @@ def test_every_topic_has_one_record_for_every_tick(flight: Records) -> None:
 
 def test_the_run_ends_with_what_it_flew_and_no_miss(flight: Records) -> None:
     *_, end = flight["/events"]
-    assert (end.kind, end.node, end.detail) == ("end", "/plant", "17403 ticks flown, 0 missed")
-    assert not [event for event in flight["/events"] if event.kind in ("miss", "rejected", "fallback")]
+    assert (end.kind, end.node, end.detail) == (EventKind.END, "/plant", "17403 ticks flown, 0 missed")
+    kinds = {event.kind for event in flight["/events"]}
+    assert not kinds & {EventKind.MISS, EventKind.REJECTED, EventKind.FALLBACK}
 
 
 def test_nothing_in_the_flight_is_not_finite(flight: Records) -> None:
@@ -215,8 +217,9 @@ def test_a_scheduled_swap_takes_over_at_its_tick_and_no_command_is_missed() -> N
     run, records = fly({"/**/controller": {"schedule": ["{at: 50.0, algorithm: coast}"]}}, ticks=80)
     laws = [status.algorithm for status in records["/deputy1/status"]]
     assert laws == ["lqr"] * 50 + ["coast"] * 30
-    (swap,) = [event for event in records["/events"] if event.kind == "parameters"]
-    assert (swap.tick, swap.node, swap.detail) == (50, "/deputy1/controller", "algorithm: lqr -> coast")
+    (swap,) = [event for event in records["/events"] if event.kind == EventKind.PARAMETERS]
+    assert (swap.tick, swap.node) == (50, "/deputy1/controller")
+    assert swap.changes == [ParameterChange("algorithm", '"lqr"', '"coast"')]
     assert len(records["/deputy1/thrust"]) == 80
     assert run.misses == 0
     assert np.abs(forces(records)[49]).max() > 1e-4
@@ -253,7 +256,7 @@ def test_mpc_keeps_out_of_the_way_of_the_others_of_its_fleet(radius: float, leas
     both = column(records["/truth"], lambda truth: [deputy.relative_state[:3] for deputy in truth.deputies])
     assert least < np.linalg.norm(both[:, 0] - both[:, 1], axis=1).min() < most
     assert np.linalg.norm(both[-1] - [[0.0, -100.0, 0.0], [0.0, -200.0, 0.0]], axis=1).max() < 3.0
-    assert not [event for event in records["/events"] if event.kind == "fallback"]
+    assert not [event for event in records["/events"] if event.kind == EventKind.FALLBACK]
 
 
 def test_a_deputy_without_an_estimate_misses_its_ticks_and_comes_back_with_a_fix(
@@ -269,9 +272,9 @@ def test_a_deputy_without_an_estimate_misses_its_ticks_and_comes_back_with_a_fix
     for _ in range(20):
         run.tick(lambda topic, record: records.setdefault(topic, []).append(record))
     assert run.misses == 3
-    misses = [event for event in records["/events"] if event.kind == "miss"]
-    assert [(event.tick, event.node, event.detail) for event in misses] == [
-        (tick, "/plant", "deputy1 gave no answer: no thrust") for tick in (10, 11, 12)
+    misses = [event for event in records["/events"] if event.kind == EventKind.MISS]
+    assert [(event.tick, event.node, event.subject) for event in misses] == [
+        (tick, "/plant", "deputy1") for tick in (10, 11, 12)
     ]
     applied = column(records["/truth"], lambda truth: truth.deputies[0].applied_force)
     assert not applied[11:14].any()
@@ -302,6 +305,6 @@ def test_a_satellite_without_an_estimate_costs_its_fleet_a_tick_as_on_the_graph(
         run.tick(lambda topic, record: records.setdefault(topic, []).append(record))
     for name in ("deputy1", "deputy3", "deputy4"):
         assert len(records[f"/{name}/estimate"]) == 7
-        flown = {each.time // NANOSECONDS: len(each.others) for each in records[f"/{name}/target"]}
+        flown = {each.time // NANOSECONDS: len(each.neighbours) for each in records[f"/{name}/target"]}
         assert flown == {0: 3, 1: 3, 2: 3, 4: 2, 5: 3, 6: 3}
     assert run.misses == 4

@@ -4,6 +4,7 @@ import contextlib
 import dataclasses
 import re
 import struct
+from collections.abc import Iterable
 from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -22,24 +23,28 @@ from formation_gnc.transport.raw_topics import first_stamp
 from formation_gnc.types import NANOSECONDS
 
 RECORDS = [each for each in vars(records).values() if dataclasses.is_dataclass(each)]
-RECORDS.remove(records.NavigationState)  # an extract of an estimate
-MESSAGES = [each for each in RECORDS if each is not records.SatelliteTruth]  # is only ever part of one
+RECORDS.remove(records.NavigationState)  # an excerpt of an estimate
+MESSAGES = [each for each in RECORDS if "time" in each.__dataclass_fields__]  # the others are part of these
 SCALARS: dict[str, st.SearchStrategy[Any]] = {
     "double": st.floats(),  # with NaNs, infinities, signed zeros and subnormals
     "boolean": st.booleans(),
     "string": st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=20),
     **{f"uint{size}": st.integers(0, 2**size - 1) for size in (8, 32, 64)},
 }
-TIMES = st.integers(0, 2**31 * NANOSECONDS - 1)
+STAMPS = st.integers(0, 2**31 * NANOSECONDS - 1)
+TIMES = st.integers(-(2**31) * NANOSECONDS, 2**31 * NANOSECONDS - 1)
+SCALARS |= {f"builtin_interfaces/{name}": TIMES for name in ("Time", "Duration")}
+ROWS = {"RelativeState": ("double", (-1, 6)), "Interval": ("builtin_interfaces/Time", (-1, 2))}
 
 
 def values(field: dataclasses.Field[Any], hint: Any, kind: str) -> st.SearchStrategy[Any]:
     """Whatever a field of a record may hold, by the type `kind` of the message's field."""
     element, count = re.fullmatch(r"(?:sequence<)?([\w/]+)(?:>|\[(\d+)\])?", kind).groups()  # type: ignore[union-attr]
-    if element not in SCALARS:
-        return st.lists(instances(getattr(records, element.rpartition("/")[2])), max_size=3)
+    if element not in SCALARS and get_origin(hint) is list:
+        return st.lists(instances(get_args(hint)[0]), max_size=3)
     if get_origin(hint) is np.ndarray:
-        shape = field.metadata.get("shape", count and (int(count),))
+        fixed = element, field.metadata.get("shape", count and (int(count),))
+        element, shape = ROWS.get(element.rpartition("/")[2], fixed)
         (dtype,) = get_args(get_args(hint)[1])
         sizes = st.integers(0, 5).map(lambda rows: tuple(rows if side == -1 else side for side in shape))
         return sizes.flatmap(lambda size: hnp.arrays(dtype, size, elements=SCALARS[element]))
@@ -53,7 +58,7 @@ def instances(record: type) -> st.SearchStrategy[Any]:
     kinds = message_type(record).get_fields_and_field_types()
     hints = get_type_hints(record)
     fields = {
-        field.name: TIMES if field.name == "time" else values(field, hints[field.name], kinds[field.name])
+        field.name: STAMPS if field.name == "time" else values(field, hints[field.name], kinds[field.name])
         for field in dataclasses.fields(record)
     }
     return st.builds(record, **fields)
@@ -72,6 +77,15 @@ def bits(value: Any) -> Any:
     return type(value), value
 
 
+def numbers(value: Any) -> list[Any]:
+    """All numbers in a message or sequence, times in ns."""
+    if hasattr(value, "nanosec"):
+        return [value.sec * NANOSECONDS + value.nanosec]
+    if hasattr(value, "get_fields_and_field_types"):
+        return numbers([getattr(value, name) for name in value.get_fields_and_field_types()])
+    return [number for each in value for number in numbers(each)] if isinstance(value, Iterable) else [value]
+
+
 def plain(record: Any, message: Any) -> Any:
     """A record's fields and types with the values of a message that ROS has read."""
     hints = get_type_hints(type(record))
@@ -84,7 +98,9 @@ def plain(record: Any, message: Any) -> Any:
             continue
         theirs = getattr(message, field.name)
         if get_origin(hints[field.name]) is np.ndarray:
-            theirs = np.array(theirs, dtype=mine.dtype).reshape(mine.shape)
+            theirs = np.array(numbers(theirs), dtype=mine.dtype).reshape(mine.shape)
+        elif hasattr(theirs, "nanosec"):
+            (theirs,) = numbers(theirs)
         elif get_origin(hints[field.name]) is list:
             nested = mine and dataclasses.is_dataclass(mine[0])
             theirs = [plain(*pair) for pair in zip(mine, theirs, strict=True)] if nested else list(theirs)
@@ -126,7 +142,7 @@ def test_bytes_that_are_no_such_message_are_rejected() -> None:
         from_cdr(records.Estimate, data)
     truth = bytearray(to_cdr(records.Truth(5, np.zeros(6), [])))
     truth[-4:] = b"\xff\xff\xff\xff"  # this many deputies
-    with pytest.raises(ConfigurationError, match="4294967295 of something"):
+    with pytest.raises(ConfigurationError, match="4294967295 elements in"):
         from_cdr(records.Truth, bytes(truth))
 
 
@@ -149,14 +165,14 @@ def test_bytes_behind_a_message_are_passed_over() -> None:
 
 
 def test_text_that_is_not_utf8_is_marked_as_such() -> None:
-    data = to_cdr(records.Timing(5, "plant", 0.1))
+    data = to_cdr(records.Timing(5, "plant", 100))
     assert from_cdr(records.Timing, data.replace(b"plant", b"pl\xffnt")).node == "pl\N{REPLACEMENT CHARACTER}nt"
 
 
 def test_text_without_its_zero_is_empty() -> None:
     """As some who write DDS have it."""
-    data = struct.pack("<2s2x4id", b"\0\1", 5, 6, 0, 0, 0.1)
-    assert bits(from_cdr(records.Timing, data)) == bits(records.Timing(5_000_000_006, "", 0.1))
+    data = struct.pack("<2s2x6i", b"\0\1", 5, 6, 0, 0, 0, 100)
+    assert bits(from_cdr(records.Timing, data)) == bits(records.Timing(5_000_000_006, "", 100))
 
 
 @pytest.mark.parametrize(
@@ -169,7 +185,7 @@ def test_numbers_of_any_type_and_layout_are_written(force: Any) -> None:
 
 def test_a_matrix_is_written_row_by_row() -> None:
     rows = np.arange(12.0).reshape(2, 6)
-    target = records.Target(5, "", np.zeros(6), 1.0, np.asfortranarray(rows))
+    target = records.Target(5, "", np.zeros(6), 1, np.asfortranarray(rows))
     assert from_cdr(records.Target, to_cdr(target)).preview.tolist() == rows.tolist()
 
 
@@ -186,13 +202,29 @@ def test_a_field_of_the_wrong_length_is_not_written() -> None:
     with pytest.raises(ValueError, match="4 numbers where the message has 3"):
         to_cdr(records.Status(0, "lqr", np.ones(3), [True] * 4))
     with pytest.raises(ValueError, match="13 numbers in rows of 6"):
-        to_cdr(records.Target(0, "", np.zeros(6), 1.0, np.ones(13)))
+        to_cdr(records.Target(0, "", np.zeros(6), 1, np.ones(13)))
 
 
-def test_rows_that_are_not_full_are_rejected() -> None:
-    data = to_cdr(records.Target(0, "", np.zeros(6), 1.0, np.ones((2, 6))))
-    with pytest.raises(ConfigurationError, match="13 numbers in rows of 6"):
-        from_cdr(records.Target, data.replace(struct.pack("<I", 12), struct.pack("<I", 13)))
+@pytest.mark.parametrize(
+    ("duration", "sec", "nanosec"), [(0, 0, 0), (-1, -1, 999_999_999), (-1_500_000_000, -2, 500_000_000)]
+)
+def test_a_negative_duration_has_its_seconds_rounded_down(duration: int, sec: int, nanosec: int) -> None:
+    message = deserialize_message(to_cdr(records.Timing(0, "plant", duration)), messages.Timing)
+    assert (message.compute_time.sec, message.compute_time.nanosec) == (sec, nanosec)
+    assert from_cdr(records.Timing, serialize_message(message)).compute_time == duration
+
+
+@pytest.mark.parametrize("time", [2**31 * NANOSECONDS, -(2**31) * NANOSECONDS - 1])
+def test_a_time_beyond_32_bits_of_seconds_is_not_written(time: int) -> None:
+    with pytest.raises(ValueError, match="Timing: 'i' format requires"):
+        to_cdr(records.Timing(0, "plant", time))
+    with pytest.raises(ValueError, match=r"eclipses: .* s, must be within 32 bits"):
+        to_cdr(records.Target(0, "", np.zeros(6), 1, np.ones((0, 6)), np.array([[0, time]])))
+
+
+def test_times_that_are_not_whole_nanoseconds_are_not_written() -> None:
+    with pytest.raises(ValueError, match=r"eclipses: float64 of shape \(1, 2\), must be int64 \(N, 2\)"):
+        to_cdr(records.Target(0, "", np.zeros(6), 1, np.ones((0, 6)), np.array([[0.0, 1.0]])))
 
 
 @pytest.mark.parametrize("record", RECORDS)
@@ -228,6 +260,7 @@ def test_numbers_that_stand_for_something_stand_for_the_same_in_records_and_mess
     status = {each.name: each.value for each in records.EstimateStatus}
     rejections = {f"REJECTED_{each.name}": each.value for each in records.Rejection}
     assert constants(messages.Estimate) == status | rejections
+    assert constants(messages.Event) == {each.name: each.value for each in records.EventKind}
 
 
 @given(instances(records.Estimate), st.sampled_from(["hill", "", "rtn ", "lvlh", "deputy1/hill"]))

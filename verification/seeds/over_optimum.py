@@ -18,7 +18,7 @@ from formation_gnc.guidance.relative_orbit import RelativeOrbit, RelativeOrbitPa
 from formation_gnc.orbit.constants import MU
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
-from formation_gnc.records import NOBODY, Target
+from formation_gnc.records import NO_NEIGHBOURS, Target
 from formation_gnc.relative.chief import KeplerChief, OblateChief
 from formation_gnc.relative.model import NO_THRUST
 from formation_gnc.types import NANOSECONDS
@@ -90,7 +90,7 @@ def ellipse(rho: float) -> Callable[[float], Target]:
 
     def aim(time: float) -> Target:
         states = path.states(np.asarray(time + ahead))
-        return Target(round(time * NANOSECONDS), "", states[0], PREVIEW_STEP, states[1:])
+        return Target(round(time * NANOSECONDS), "", states[0], round(PREVIEW_STEP * NANOSECONDS), states[1:])
 
     return aim
 
@@ -138,7 +138,9 @@ def held(name: str, eccentricity: float, oblate: bool, rho: float) -> float:
     free, _ = fly(plant, goal, lambda time, state: NO_THRUST, round(HORIZON / TICK), TICK)
 
     def aim(time: float) -> Target:
-        return Target(round(time * NANOSECONDS), "", free[round(time / TICK)], PREVIEW_STEP, NOBODY)
+        return Target(
+            round(time * NANOSECONDS), "", free[round(time / TICK)], round(PREVIEW_STEP * NANOSECONDS), NO_NEIGHBOURS
+        )
 
     law = regulator(name, eccentricity, oblate, rho)
     states, accelerations, _ = fly_law(law, eccentricity, oblate, aim, HORIZON)

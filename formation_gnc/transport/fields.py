@@ -1,0 +1,371 @@
+"""Message fields in plain CDR: where their values lie, and the source code that packs and unpacks them."""
+
+import dataclasses
+import struct
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from math import prod
+from typing import Any, NoReturn, override
+
+import numpy as np
+
+from formation_gnc.types import NANOSECONDS, Times, Vector
+
+LITTLE_ENDIAN = b"\0\1"
+"""Encapsulation of plain little-endian CDR, the first bytes of a message."""
+
+BODY = 4
+"""Offset of the first field (bytes); fields are aligned from here."""
+
+TIME = np.dtype([("sec", "<i4"), ("nanosec", "<u4")])
+"""builtin_interfaces Time and Duration: whole seconds, rounded down, and the nanoseconds from there."""
+
+COUNT = struct.Struct("<I")
+
+
+class Format:
+    """A struct format for values at given offsets; everything else is padding."""
+
+    def __init__(self) -> None:
+        """Without a value."""
+        self._format, self._end = "<", 0
+
+    def add(self, offset: int, size: int, values: str) -> None:
+        """Append values of `size` bytes, as `struct` writes them."""
+        self._format += f"{offset - self._end}x{values}"
+        self._end = offset + size
+
+    def packer(self, size: int) -> Callable[..., bytes]:
+        """Packs values into a message of `size` bytes."""
+        return struct.Struct(f"{self._format}{size - self._end}x").pack
+
+    def unpacker(self) -> Callable[[bytes], tuple[Any, ...]]:
+        """Unpacks the values of a message."""
+        return struct.Struct(self._format).unpack_from
+
+
+class Layout(ABC):
+    """Offsets of a message's values, which depend on the counts in it alone; fields append themselves."""
+
+    unpacks: bool
+
+    def __init__(self) -> None:
+        """Begin with the encapsulation."""
+        self.offset = BODY
+        self.format = Format()
+        self.format.add(0, len(LITTLE_ENDIAN), f"{len(LITTLE_ENDIAN)}s")
+
+    def add(self, code: str, number: int = 1, *, as_bytes: bool = False) -> None:
+        """Append numbers of the type that `struct` calls `code`, aligned to their size."""
+        size = struct.calcsize(f"<{code}")
+        if number:
+            self.offset += (BODY - self.offset) % size
+        start, self.offset = self.offset, self.offset + number * size
+        self.place(start, number * size, f"{number * size}s" if as_bytes else f"{number}{code}")
+
+    def skip(self, size: int) -> None:
+        """Append bytes that carry nothing."""
+        self.offset += size
+
+    def place(self, offset: int, size: int, values: str) -> None:
+        """Add values to the format in use."""
+        self.format.add(offset, size, values)
+
+    @abstractmethod
+    def count(self) -> int:
+        """Append a count and return it."""
+
+    @abstractmethod
+    def elements(self, name: str, number: int, fields: "Iterable[Field]") -> None:
+        """Append the elements of a list field."""
+
+
+class PackingLayout(Layout):
+    """Layout of a message to be written, with all values in one format."""
+
+    unpacks = False
+
+    def __init__(self, counts: Iterable[int]) -> None:
+        """Take the counts in their order."""
+        super().__init__()
+        self._counts = iter(counts)
+
+    @override
+    def count(self) -> int:
+        self.add("I")
+        return next(self._counts)
+
+    @override
+    def elements(self, name: str, number: int, fields: "Iterable[Field]") -> None:
+        for _ in range(number):
+            for field in fields:
+                field.append_to(self)
+
+
+class UnpackingLayout(Layout):
+    """Layout of a message that was received.
+
+    `format` has the values of the message's own fields, of those that are not wanted the counts only;
+    `counts` are their values. The format of each list in `lists` has its elements' values, `inner_format`
+    the counts in all elements, of values `inner_counts`.
+    """
+
+    unpacks = True
+
+    def __init__(self, data: bytes) -> None:
+        """Read the counts from `data`."""
+        super().__init__()
+        self._data = data
+        self.inner_format = Format()
+        self.lists: dict[str, Format] = {}
+        self.counts: list[int] = []
+        self.inner_counts: list[int] = []
+        self.is_wanted = True
+        """Whether the record has the field that is being appended."""
+        self._list: Format | None = None
+
+    def check_size(self) -> None:
+        """Raise ValueError when the message is too short for what has been appended."""
+        if self.offset > len(self._data):
+            raise ValueError(f"its fields take {self.offset} bytes or more")
+
+    @override
+    def place(self, offset: int, size: int, values: str) -> None:
+        self.check_size()
+        if self.is_wanted:
+            (self._list or self.format).add(offset, size, values)
+
+    @override
+    def count(self) -> int:
+        offset = self.offset + (BODY - self.offset) % COUNT.size
+        (count,) = COUNT.unpack_from(self._data, offset)
+        if count > len(self._data):
+            raise ValueError(f"{count} elements in {len(self._data)} bytes")
+        self.offset = offset + COUNT.size
+        for counts in [self.inner_format, self._list] if self._list else [self.format]:
+            counts.add(offset, COUNT.size, "I")
+        (self.inner_counts if self._list else self.counts).append(count)
+        return int(count)
+
+    @override
+    def elements(self, name: str, number: int, fields: "Iterable[Field]") -> None:
+        self._list = self.lists[name] = Format()
+        for _ in range(number):
+            for field in fields:
+                field.append_to(self)
+        self._list = None
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One field of a message, and of the record that mirrors it.
+
+    Packing and unpacking are source code. Lists of expressions and targets have a comma behind each item.
+    Local variables are an underscore and the field's name, with or without a suffix behind two more.
+    """
+
+    name: str
+    append_to: Callable[[Layout], None]
+    prepare: str
+    """Statements that come first when a `record` is packed."""
+    counts: str
+    """Counts of a prepared record."""
+    values: str
+    """All values of a prepared record, counts included."""
+    targets: str
+    """What the values are unpacked into."""
+    count_targets: str
+    """Those of the targets that are counts."""
+    result: str
+    """Value of the record's field, from the targets."""
+    elements: "Elements | None" = None
+
+
+@dataclass(frozen=True, slots=True)
+class Elements:
+    """Elements of a list of records."""
+
+    record_type: type | None
+    fields: tuple[Field, ...]
+
+
+def number(name: str, code: str) -> Field:
+    """One number of a struct type."""
+    return Field(name, lambda layout: layout.add(code), "", "", f"record.{name},", f"_{name},", "", f"_{name}")
+
+
+def time(name: str) -> Field:
+    """A Time or Duration, int nanoseconds in the record."""
+    targets = f"_{name}, _{name}__rest,"
+    result = f"_{name} * {NANOSECONDS} + _{name}__rest"
+    return Field(name, _add_time, "", "", f"*divmod(record.{name}, {NANOSECONDS}),", targets, "", result)
+
+
+def header(name: str, frame_id: str) -> Field:
+    """A std_msgs Header; the record has its stamp as int nanoseconds."""
+    stamp, frame = time(name), frame_id.encode() + b"\0"
+
+    def append_to(layout: Layout) -> None:
+        stamp.append_to(layout)
+        count = layout.count()
+        if layout.unpacks:
+            layout.skip(count)
+        else:
+            layout.add("B", count, as_bytes=True)
+
+    values = f"{stamp.values} {len(frame)}, {frame!r},"
+    count = f"_{name}__count,"
+    return Field(name, append_to, "", f"{len(frame)},", values, f"{stamp.targets} {count}", count, stamp.result)
+
+
+def numbers(name: str, code: str, size: int) -> Field:
+    """A list of `size` numbers."""
+    prepare = f"_{name} = record.{name}; {_check(name, f'len(_{name})', size)}"
+    targets = "".join(f"_{name}__{index}," for index in range(size))
+    return Field(name, lambda layout: layout.add(code, size), prepare, "", f"*_{name},", targets, "", f"[{targets}]")
+
+
+def sequence(name: str, code: str) -> Field:
+    """A list of any number of numbers."""
+
+    def append_to(layout: Layout) -> None:
+        layout.add(code, layout.count(), as_bytes=layout.unpacks)
+
+    result = f"[each for (each,) in each_{np.dtype(code).name}(_{name})] if _{name} else []"  # most are empty
+    return _counted(name, append_to, f"_{name} = record.{name}", f"len(_{name})", f"*_{name}", result)
+
+
+def text(name: str) -> Field:
+    """UTF-8, ended by a zero."""
+
+    def append_to(layout: Layout) -> None:
+        count = layout.count()
+        layout.add("B", max(count - 1, 0), as_bytes=True)
+        layout.skip(min(count, 1))
+
+    prepare, result = f"_{name} = record.{name}.encode()", f"_{name}.decode('utf-8', 'replace')"
+    return _counted(name, append_to, prepare, f"len(_{name}) + 1", f"_{name}", result)
+
+
+def array(name: str, code: str, shape: tuple[int, ...]) -> Field:
+    """An array of fixed shape, written row by row."""
+    dtype, size = np.dtype(code), prod(shape)
+    prepare = f"_{name} = asarray(record.{name}, {dtype.name}).tobytes()"
+    prepare += f"; {_check(name, f'len(_{name}) // {dtype.itemsize}', size)}"
+    result = f"ndarray({shape}, {dtype.name}, bytearray(_{name}))"  # writable, as any array
+    return Field(
+        name,
+        lambda layout: layout.add(code, size, as_bytes=True),
+        prepare=prepare,
+        counts="",
+        values=f"_{name},",
+        targets=f"_{name},",
+        count_targets="",
+        result=result,
+    )
+
+
+def rows(name: str, code: str, shape: tuple[int, ...]) -> Field:
+    """An array of any number of rows of a shape: of numbers, or of messages that hold nothing but numbers."""
+    dtype, size = np.dtype(code), prod(shape)
+    prepare = f"_{name} = asarray(record.{name}, {dtype.name}).tobytes()"
+    if size > 1:
+        prepare += f"; len(_{name}) % {dtype.itemsize * size} and reject_rows({name!r}, record.{name}, {shape})"
+
+    def append_to(layout: Layout) -> None:
+        layout.add(code, layout.count() * size, as_bytes=True)
+
+    sides = "".join(f" {side}," for side in shape)
+    result = f"ndarray((_{name}__count,{sides}), {dtype.name}, bytearray(_{name}))"
+    return _counted(name, append_to, prepare, f"len(_{name}) // {dtype.itemsize * size}", f"_{name}", result)
+
+
+def times(name: str, width: int) -> Field:
+    """An array (N, width) of int nanoseconds, from messages that hold nothing but a Time or Duration each."""
+
+    def append_to(layout: Layout) -> None:
+        layout.add("I", 2 * width * layout.count(), as_bytes=True)
+
+    prepare = f"_{name} = pack_times({name!r}, record.{name}, {width})"
+    count, result = f"len(_{name}) // {TIME.itemsize * width}", f"unpack_times(_{name}, {width})"
+    return _counted(name, append_to, prepare, count, f"_{name}", result)
+
+
+def records(name: str, record_type: type | None, fields: list[Field]) -> Field:
+    """A list of records that have no lists of records themselves; no record type where it is not read."""
+
+    def append_to(layout: Layout) -> None:
+        layout.elements(name, layout.count(), fields)
+
+    targets = "".join(field.targets for field in fields)
+    result = f"new_{name}({arguments(record_type, fields)})" if record_type else "None"
+    values = f"batched(unpack_{name}(data), {targets.count(',')})"
+    return Field(
+        name,
+        append_to,
+        prepare=f"_{name} = [pack_{name}(each) for each in record.{name}]",
+        counts=f"len(_{name}), *[count for counts, _ in _{name} for count in counts],",
+        values=f"len(_{name}), *[value for _, values in _{name} for value in values],",
+        targets=f"_{name}__count,",
+        count_targets=f"_{name}__count,",
+        result=f"[{result} for {targets} in {values}] if _{name}__count else []",
+        elements=Elements(record_type, tuple(fields)),
+    )
+
+
+def arguments(record_type: type, fields: Sequence[Field]) -> str:
+    """Source of the arguments that construct a record from the targets of its message's fields.
+
+    By place, since calls by keyword take twice as long.
+    """
+    results = {field.name: field.result for field in fields}
+    return ", ".join(results[field.name] for field in dataclasses.fields(record_type))
+
+
+def pack_times(name: str, given: Times, width: int) -> bytes:
+    """Times (ns) as the bytes of Time messages; raises ValueError for others."""
+    nanoseconds = np.asarray(given)
+    if not nanoseconds.size:
+        return b""
+    if nanoseconds.dtype.kind != "i" or nanoseconds.shape[1:] != (width,):
+        raise ValueError(f"{name}: {nanoseconds.dtype} of shape {nanoseconds.shape}, must be int64 (N, {width})")
+    seconds, rest = np.divmod(nanoseconds, NANOSECONDS)
+    packed = np.empty(nanoseconds.shape, TIME)
+    packed["sec"], packed["nanosec"] = seconds, rest
+    if (packed["sec"] != seconds).any():
+        raise ValueError(f"{name}: {seconds.ravel().tolist()} s, must be within 32 bits")
+    return packed.tobytes()
+
+
+def unpack_times(packed: bytes, width: int) -> Times:
+    """Times (N, width), ns, from the bytes of Time messages."""
+    values = np.frombuffer(packed, TIME).reshape(-1, width)
+    nanoseconds: Times = values["sec"].astype(np.int64) * NANOSECONDS + values["nanosec"]
+    return nanoseconds
+
+
+def reject_size(name: str, size: int, allowed: int) -> NoReturn:
+    """Raise ValueError for an array or list of another size than the message's."""
+    raise ValueError(f"{name}: {size} numbers where the message has {allowed}")
+
+
+def reject_rows(name: str, given: Vector, shape: tuple[int, ...]) -> NoReturn:
+    """Raise ValueError for an array whose rows are not those of the message."""
+    raise ValueError(f"{name}: {np.size(given)} numbers in rows of {prod(shape)}")
+
+
+def _add_time(layout: Layout) -> None:
+    layout.add("i")
+    layout.add("I")
+
+
+def _counted(
+    name: str, append_to: Callable[[Layout], None], prepare: str, count: str, value: str, result: str
+) -> Field:
+    target = f"_{name}__count,"
+    return Field(name, append_to, prepare, f"{count},", f"{count}, {value},", f"{target} _{name},", target, result)
+
+
+def _check(name: str, size: str, allowed: int) -> str:
+    return f"{size} == {allowed} or reject_size({name!r}, {size}, {allowed})"
