@@ -3,7 +3,8 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 NAME = "formation_gnc"
-NODES = ["plant", "navigation", "guidance", "controller", "satellite", "display", "recorder", "replay"]
+MODULES = ["navigation", "guidance", "controller"]  # rows of formation_gnc/flight/graph.py
+NODES = ["plant", "satellite", "display", "recorder", "replay"]
 
 
 def files(folder: str, pattern: str) -> list[str]:
@@ -31,6 +32,7 @@ setup(
     extras_require={"test": ["pytest"]},
     entry_points={
         "console_scripts": [
+            *(f"{module} = {NAME}.nodes.module:main" for module in MODULES),
             *(f"{node} = {NAME}.nodes.{node}:main" for node in NODES),
             f"formation-gnc = {NAME}.cli:main",
         ]

@@ -12,9 +12,10 @@ from time import process_time
 import yaml
 
 from bench.result import Result
+from formation_gnc.sil.plant_executive import Report
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import SECTION, Scenario, find_scenario, load_scenario
-from formation_gnc.transport.launcher import Report, fly_graph
+from formation_gnc.transport.launcher import LaunchOptions, fly_graph
 
 SCENARIO = "projected_circle"
 CORES = 2
@@ -103,7 +104,7 @@ def fly(count: int, in_touch: bool) -> Flight:
             seen.append((report.figures["tick"], report.figures["wall_time"], *times))
 
     with some_of(count, in_touch) as scenario:
-        last = fly_graph(scenario, None, look, lambda _: None, composed=True)
+        last = fly_graph(scenario, LaunchOptions(composed=True), look, lambda _: None)
         alone = Run(scenario)
         alone.tick(lambda topic, record: None)  # which shares places out
         started = process_time()

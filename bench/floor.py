@@ -20,31 +20,32 @@ from rclpy.serialization import serialize_message
 from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 
-from formation_gnc.transport import topics
+from formation_gnc.flight import topics
 from formation_gnc.transport.node import Executor
+from formation_gnc.transport.qos import LATEST, quality
 
 STAMP = struct.Struct("<i")
 """Seconds of a stamp, with which every message begins."""
 
 ROLES = ("navigation", "guidance", "controller", "plant")
 INPUTS = {
-    "navigation": [(messages.Measurement, topics.MEASUREMENT)],
-    "guidance": [(messages.Estimate, topics.ESTIMATE)],
-    "controller": [(messages.Estimate, topics.ESTIMATE), (messages.Target, topics.TARGET)],
-    "plant": [(messages.Thrust, topics.THRUST)],
+    "navigation": [(messages.Measurement, topics.MEASUREMENT.name)],
+    "guidance": [(messages.Estimate, topics.ESTIMATE.name)],
+    "controller": [(messages.Estimate, topics.ESTIMATE.name), (messages.Target, topics.TARGET.name)],
+    "plant": [(messages.Thrust, topics.THRUST.name)],
 }
 OUTPUTS = {
-    "navigation": [(messages.Estimate, topics.ESTIMATE), (messages.Timing, topics.TIMING)],
-    "guidance": [(messages.Target, topics.TARGET), (messages.Timing, topics.TIMING)],
+    "navigation": [(messages.Estimate, topics.ESTIMATE.name), (messages.Timing, topics.TIMING.name)],
+    "guidance": [(messages.Target, topics.TARGET.name), (messages.Timing, topics.TIMING.name)],
     "controller": [
-        (messages.Thrust, topics.THRUST),
-        (messages.Status, topics.STATUS),
-        (messages.Timing, topics.TIMING),
+        (messages.Thrust, topics.THRUST.name),
+        (messages.Status, topics.STATUS.name),
+        (messages.Timing, topics.TIMING.name),
     ],
     "plant": [
-        (messages.Measurement, topics.MEASUREMENT),
-        (messages.Truth, topics.TRUTH),
-        (Clock, topics.CLOCK),
+        (messages.Measurement, topics.MEASUREMENT.name),
+        (messages.Truth, topics.TRUTH.name),
+        (Clock, topics.CLOCK.name),
     ],
 }
 
@@ -60,13 +61,12 @@ class Relay(Node):  # type: ignore[misc]
         self.role, self.ticks, self.tick = role, ticks, 0
         self.done = Future()
         self.outputs = [
-            (self.made(_filled(kind())), self.create_publisher(kind, topic, topics.quality()))
-            for kind, topic in OUTPUTS[role]
+            (self.made(_filled(kind())), self.create_publisher(kind, topic, quality())) for kind, topic in OUTPUTS[role]
         ]
         self.stamps: dict[str, int] = {}
         for kind, topic in INPUTS[role]:
             hear = partial(self.receive, topic)
-            self.create_subscription(kind, topic, hear, topics.quality(topics.LATEST), raw=self.raw)
+            self.create_subscription(kind, topic, hear, quality(LATEST), raw=self.raw)
 
     def made(self, message: Any) -> Any:
         """What is kept to be sent."""

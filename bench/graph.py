@@ -15,7 +15,7 @@ from formation_gnc.recording.writer import BagWriter
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
 from formation_gnc.transport.in_process_recorder import InProcessRecorder
-from formation_gnc.transport.launcher import fly_graph
+from formation_gnc.transport.launcher import LaunchOptions, fly_graph
 
 TICKS = 6000
 ROUNDS = 5
@@ -41,7 +41,7 @@ def graph(record: bool) -> float:
     scenario = load_scenario("leader_follower", {"/plant": {"duration": float(TICKS)}})
     with tempfile.TemporaryDirectory() as directory:
         bag = Path(directory) / "bag" if record else None
-        report = fly_graph(scenario, bag, lambda _: None, lambda _: None)
+        report = fly_graph(scenario, LaunchOptions(bag), lambda _: None, lambda _: None)
     return report.figures["tick"] / report.figures["wall_time"]
 
 

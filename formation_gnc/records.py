@@ -19,7 +19,10 @@ class Record:
 
     __slots__ = ()
     message: ClassVar[str]
-    """Name of the message that the record mirrors; the record may lack fields of one that it only reads."""
+    """Name of the message that the record mirrors, with its package if it is not ours.
+
+    A record may lack fields of a message that it only reads.
+    """
     frame_id: ClassVar[str] = ""
     """Frame named in the message's header."""
 
@@ -203,6 +206,20 @@ class Separation(Record):
     def nearest(self) -> str:
         """Name of the neighbour at the lesser of both distances."""
         return self.planned_neighbour if self.planned <= self.passive else self.passive_neighbour
+
+
+@dataclass(slots=True)
+class Clock(Record):
+    """Simulated time."""
+
+    message: ClassVar = "rosgraph_msgs/Clock"
+
+    clock: int
+
+    @property
+    def time(self) -> int:
+        """As the stamp of other records."""
+        return self.clock
 
 
 @dataclass(slots=True)

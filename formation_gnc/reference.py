@@ -9,12 +9,12 @@ from formation_gnc.common import CommonParameters
 from formation_gnc.control.controller_manager import ControllerParameters
 from formation_gnc.guidance.guidance import GuidanceParameters
 from formation_gnc.navigation.navigation_filter import NavigationParameters
-from formation_gnc.nodes.display import DisplayParameters
-from formation_gnc.nodes.recorder import RecorderParameters
-from formation_gnc.nodes.replay import ReplayParameters
 from formation_gnc.parameters import Leaf, leaves
 from formation_gnc.plant.plant import PlantParameters
 from formation_gnc.recording.layout import LAYOUT, foxglove_layout
+from formation_gnc.recording.parameters import RecorderParameters
+from formation_gnc.recording.player import ReplayParameters
+from formation_gnc.transport.markers import DisplayParameters
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "reference" / "parameters.md"
 LAYOUT_PAGE = PAGE.with_name(LAYOUT)

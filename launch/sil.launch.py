@@ -11,6 +11,7 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
+from formation_gnc.flight.graph import MODULES
 from launch import LaunchContext, LaunchDescription
 
 
@@ -56,6 +57,6 @@ def nodes(context: LaunchContext) -> list[Node]:
         *(
             node(executable, namespace)
             for namespace in plant.get("deputies", ["deputy1"])
-            for executable in (["satellite"] if composed == "true" else ["navigation", "guidance", "controller"])
+            for executable in (["satellite"] if composed == "true" else MODULES)
         ),
     ]

@@ -12,14 +12,15 @@ import pytest
 
 from formation_gnc.analysis.compare import gnc_topics
 from formation_gnc.cli import main
+from formation_gnc.flight.graph import MODULES
+from formation_gnc.flight.topics import QUEUE_DEPTH
 from formation_gnc.recording.reader import Bag, identical, read
 from formation_gnc.recording.writer import BagWriter, TopicDefinition
 from formation_gnc.records import EventKind, Timing
-from formation_gnc.sil.replay import KINDS, nodes_of, parameters_of, replay
+from formation_gnc.sil.replay import nodes_of, parameters_of, replay
 from formation_gnc.sil.scenario import find_scenario, load_scenario
 from formation_gnc.transport.conversion import codec
 from formation_gnc.transport.in_process_recorder import reader
-from formation_gnc.transport.topics import DEPTH
 from formation_gnc.types import NANOSECONDS
 
 
@@ -150,7 +151,7 @@ def test_swaps_by_schedule_and_by_hand_are_flown_again_at_their_tick(
     assert list(Bag(bag).arrays("/events")["kind"]).count(EventKind.PARAMETERS) == 3
     # without the schedule in its parameters, the same swaps are changes that somebody made in flight
     recorded = Bag(bag)
-    values = {node: parameters_of(recorded, node) for node in nodes_of(recorded, KINDS)}
+    values = {node: parameters_of(recorded, node) for node in nodes_of(recorded, list(MODULES))}
     for each in values.values():
         each.pop("schedule", None)
     said: list[tuple[str, int]] = []
@@ -186,7 +187,7 @@ def rewritten(
             if number := numbers.get((topic, stamp), 2):
                 writer.write(topic, data, stamp, number)
         if timings:
-            writer.add_topic("/deputy1/timing", "formation_gnc_msgs/msg/Timing", DEPTH)
+            writer.add_topic("/deputy1/timing", "formation_gnc_msgs/msg/Timing", QUEUE_DEPTH)
         for stamp, timing in (timings or {}).items():
             writer.write("/deputy1/timing", timing, stamp, 2)
     return directory

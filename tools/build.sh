@@ -13,4 +13,4 @@ colcon build --event-handlers desktop_notification- status-
 # Compile the Numba kernels now, and once: the nodes of the first flight would each do it, all at the same time.
 source install/setup.bash
 cd install
-python -c 'import formation_gnc.nodes.plant, formation_gnc.nodes.navigation, formation_gnc.nodes.controller'
+python -c 'import formation_gnc.nodes.plant, formation_gnc.nodes.module'

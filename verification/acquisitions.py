@@ -127,7 +127,7 @@ def scenario(acquisition: Acquisition, setting: Setting) -> Scenario:
         return load_scenario(str(NETSAT), common | {"/plant": plant, "/**/guidance": guidance})
 
     places: dict[str, Any] = {
-        f"{name}.relative_state": Guidance(f"/{name}/guidance", setup.guidance)
+        f"{name}.relative_state": Guidance(f"/{name}/guidance", setup["guidance"])
         .configuration.design.states(np.zeros(1))[0]
         .tolist()
         for name, setup in load(acquisition.left, {}, "fixed").deputies.items()
@@ -216,8 +216,8 @@ def fly(acquisition: Acquisition, setting: Setting) -> Flight:
     run = Run(flown)
     if not setting.truth:
         run.plant._propagator = HillTruth(flown.plant)
-    for satellite in run.satellites:
-        satellite.navigator = Omniscient(run.plant, satellite.name)
+    for name in run.plant.parameters.deputies:
+        run.instances[f"/{name}/navigation"].module = Omniscient(run.plant, name)
     records: dict[str, list[Any]] = {}
     run.fly(lambda topic, record: records.setdefault(topic, []).append(record))
     names = run.plant.parameters.deputies

@@ -43,17 +43,18 @@ LAWS: dict[str, dict[str, dict[str, Any]]] = {
 
 
 class Clocked:
-    """Stands where a part does, and notes the compute time of each answer."""
+    """Stands where a module does, and notes the compute time of each answer."""
 
-    def __init__(self, part: Any) -> None:
-        """Around a part."""
-        self._part = part
+    def __init__(self, module: Any) -> None:
+        """Around a module."""
+        self._module = module
         self.times: list[float] = []
+        self.take_events = module.take_events
 
     def on_tick(self, *inputs: Any) -> Any:
-        """The part's answer."""
+        """The module's answer."""
         started = thread_time()
-        answer = self._part.on_tick(*inputs)
+        answer = self._module.on_tick(*inputs)
         self.times.append(thread_time() - started)
         return answer
 
@@ -147,11 +148,12 @@ def fly(scenario: str, law: str, knows: str) -> Row:
     tick = max(TICK, load_scenario(scenario).plant.tick)
     run = Run(load_scenario(scenario, {"/**": {"tick": tick}, **LAWS[law]}))
     clocks = []
-    for satellite in run.satellites:
+    for name in run.plant.parameters.deputies:
         if knows == "truth":
-            satellite.navigator = Omniscient(run.plant, satellite.name)
-        clocks.append(Clocked(satellite.autopilot))
-        satellite.autopilot = clocks[-1]
+            run.instances[f"/{name}/navigation"].module = Omniscient(run.plant, name)
+        controller = run.instances[f"/{name}/controller"]
+        clocks.append(Clocked(controller.module))
+        controller.module = clocks[-1]
     records: dict[str, list[Any]] = {}
 
     def sink(topic: str, record: Any) -> None:

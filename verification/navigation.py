@@ -556,7 +556,7 @@ def closed_loop(directory: Path) -> tuple[str, list[Figure]]:
     for name in ("filter", "truth"):
         run = Run(scenario)
         if name == "truth":
-            run.satellites[0].navigator = Omniscient(run.plant, "deputy1")  # type: ignore[assignment]
+            run.instances["/deputy1/navigation"].module = Omniscient(run.plant, "deputy1")  # type: ignore[assignment]
         records: dict[str, list[Any]] = {"truth": [], "target": [], "thrust": []}
 
         def sink(topic: str, record: Any, records: dict[str, list[Any]] = records) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from formation_gnc.plant.plant import Plant
-from formation_gnc.records import Estimate, EstimateStatus, Measurement
+from formation_gnc.records import Estimate, EstimateStatus, Event, Measurement
 
 
 class Omniscient:
@@ -12,6 +12,10 @@ class Omniscient:
     def __init__(self, plant: Plant, name: str) -> None:
         """For a deputy of this plant."""
         self._plant, self._index = plant, plant.parameters.deputies.index(name)
+
+    def take_events(self) -> list[Event]:
+        """Nothing happens to it."""
+        return []
 
     def on_tick(self, measurement: Measurement) -> Estimate:
         """The true state at the tick."""

@@ -45,7 +45,7 @@ def run(options: argparse.Namespace) -> int:
         known = ", ".join(scenario.deputies)
         raise ConfigurationError(f"deputy {deputy}: not in {scenario.name}; it has {known}")
     try:
-        designed: Design = design(scenario.deputies[deputy].controller)
+        designed: Design = design(scenario.deputies[deputy]["controller"])
     except ConfigurationError as error:
         raise ConfigurationError(f"{scenario.name}: /{deputy}/controller: {error}") from None
     if options.plot is not None:

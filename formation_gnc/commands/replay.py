@@ -11,11 +11,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from formation_gnc.analysis.compare import gnc_topics
-from formation_gnc.parameters import to_json
-from formation_gnc.recording.provenance import parameters_record, provenance
+from formation_gnc.flight.graph import MODULES
 from formation_gnc.recording.reader import Bag, identical
-from formation_gnc.sil.replay import KINDS, nodes_of, parameters_of, replay
-from formation_gnc.sil.scenario import given_to
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,14 +21,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--nodes",
         metavar="NAMES",
-        default=",".join(KINDS),
-        help=f"which to fly again, with commas (default: {','.join(KINDS)})",
+        default=",".join(MODULES),
+        help=f"which to fly again, with commas (default: {','.join(MODULES)})",
     )
     parser.add_argument(
-        "--params",
-        metavar="FILE",
-        type=Path,
-        help="ROS 2 parameter file that goes before what is recorded",
+        "--params", metavar="FILE", type=Path, help="ROS 2 parameter file that overrides what is recorded"
     )
     parser.add_argument(
         "--bag", metavar="DIR", type=Path, help="directory to make for the new bag (default: BAG_replay_DATE)"
@@ -40,30 +34,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Replay, record, compare."""
-    from formation_gnc.recording.writer import BagWriter
-    from formation_gnc.transport.in_process_recorder import InProcessRecorder, reader
+    from formation_gnc.transport.replay_recorder import replay_into
 
     bag = Bag(options.recorded)
-    parameters = {}
-    for node in nodes_of(bag, options.nodes.split(",")):
-        changes = given_to(options.params, node) if options.params else {}
-        parameters[node] = parameters_of(bag, node) | changes
     source = options.recorded.absolute()
     output = options.bag or source.with_name(f"{source.stem}_replay_{datetime.now(UTC):%Y-%m-%d_%H-%M-%S}")
-    flown = {
-        parameters_record(node): {name: to_json(value) for name, value in values.items()}
-        for node, values in parameters.items()
-    }
-    origin = {"replay": {"source": source.name, "nodes": ", ".join(parameters)}}
-    with BagWriter(output, bag.metadata | provenance() | flown | origin, bag.attachments) as writer:
-        recorder = InProcessRecorder(writer)
-        remarks = replay(
-            bag,
-            parameters,
-            reader(bag),
-            recorder,
-            lambda topic, data, stamp: recorder.copy(bag, topic, data, stamp),
-        )
+    remarks = replay_into(bag, output, options.nodes.split(","), options.params)
     print(f"bag: {output}")
     for remark in remarks:
         print(remark)

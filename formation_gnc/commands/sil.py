@@ -138,7 +138,8 @@ class _Display:
 
 
 def _fly_on_graph(scenario: Scenario, bag: Path, console: Console, composed: bool, display: bool) -> float:
-    from formation_gnc.transport.launcher import Report, fly_graph
+    from formation_gnc.sil.plant_executive import Report
+    from formation_gnc.transport.launcher import LaunchOptions, fly_graph
 
     Run(scenario)  # what cannot be flown is rejected before anything starts
 
@@ -146,7 +147,8 @@ def _fly_on_graph(scenario: Scenario, bag: Path, console: Console, composed: boo
         shown.show(report.message, report.figures.get("tick", 0.0), report.figures.get("speedup", 0.0))
 
     with _Display(console, scenario.plant.ticks) as shown:
-        last = fly_graph(scenario, bag.absolute(), show, shown.say, composed, display)
+        options = LaunchOptions(bag.absolute(), composed, display)
+        last = fly_graph(scenario, options, show, shown.say)
         return last.figures.get("speedup", 0.0)
 
 
@@ -178,7 +180,6 @@ def _fly_in_process(scenario: Scenario, bag: Path, console: Console) -> float:
             run.tick(sink)
             if run.plant.tick % 500 == 0:
                 display.show("flying", run.plant.tick, run.plant.tick * tick / (perf_counter() - started))
-        run.finish(sink)
         return run.plant.tick * tick / (perf_counter() - started)
 
 

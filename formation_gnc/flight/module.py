@@ -50,6 +50,9 @@ class FlightModule[P: ModuleParameters, D](ABC):
     run in another thread; `commit` hands the result over, and it takes effect when the next tick begins.
     """
 
+    neighbours: tuple[str, ...] = ()
+    """Names of the fleet's other satellites whose outputs it takes."""
+
     def __init__(self, name: str, parameters: P) -> None:
         """Design from `parameters` and from every change they schedule; `name` is the node's full name.
 
@@ -76,6 +79,13 @@ class FlightModule[P: ModuleParameters, D](ABC):
     @abstractmethod
     def design(self, parameters: P) -> D:
         """What flies with these parameters; raises ConfigurationError when nothing can."""
+
+    @abstractmethod
+    def on_tick(self, *args: Any, **kwargs: Any) -> Any:
+        """Answer a tick: from the inputs of one stamp to the outputs, as the graph table lists both.
+
+        Returns the record of the only output, or a tuple with one for each; None for an output that there is not.
+        """
 
     def activate(self, old: Configuration[P, D], new: Configuration[P, D]) -> None:  # noqa: B027 - optional
         """Hand the state of the old design to the new one; called at the tick where it takes over."""
@@ -190,6 +200,12 @@ class FlightModule[P: ModuleParameters, D](ABC):
         """
         tick = time // self.parameters.tick_ns
         self.events.append(Event(time, tick, self.name, kind, subject, list(changes), detail))
+
+    def scheduled_changes(self, time: int) -> list[dict[str, str]]:
+        """New values by name, as their events will have them, of the scheduled changes due by a time (ns)."""
+        due = [configuration for at, configuration in self.foreseen if at <= time]
+        after = [dump(each.parameters) for each in due]
+        return [{name: to_json(values[name]) for name in each.changes} for each, values in zip(due, after, strict=True)]
 
     def take_events(self) -> list[Event]:
         """The events noted since they were last taken."""

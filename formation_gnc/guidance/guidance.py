@@ -138,7 +138,7 @@ class Guidance(FlightModule[Any, TargetPath]):
             raise ConfigurationError(
                 f"parameter fleet: {list(parameters.fleet)} is not allowed; no name may come twice"
             )
-        self.others = tuple(each for each in parameters.fleet if each != self._deputy)
+        self.neighbours = tuple(each for each in parameters.fleet if each != self._deputy)
         super().__init__(name, parameters)
 
     def _start(self) -> None:
@@ -251,7 +251,9 @@ class Guidance(FlightModule[Any, TargetPath]):
         """
         self.begin_tick(estimate.time)
         self._known = known = {
-            name: each for name, each in zip(self.others, others, strict=True) if each is not None and _is_near(each)
+            name: each
+            for name, each in zip(self.neighbours, others, strict=True)
+            if each is not None and _is_near(each)
         }
         if self._unassigned:
             self._take_place(estimate, known)

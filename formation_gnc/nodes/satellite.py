@@ -1,23 +1,23 @@
-"""All parts of one deputy in one process: the nodes of the graph, on one executor.
+"""All modules of one deputy in one process: the nodes of the graph, on one executor.
 
-They publish what they publish as processes of their own, to the same bits. What they say to one another goes
-from hand to hand.
+They publish what they publish as processes of their own, to the same bits; among themselves records go over the
+intra-process bus.
 """
 
-from formation_gnc.nodes.controller import ControllerNode
-from formation_gnc.nodes.guidance import GuidanceNode
-from formation_gnc.nodes.navigation import NavigationNode
+from formation_gnc.flight.graph import GRAPH
 from formation_gnc.transport.bus import IntraProcessBus
-from formation_gnc.transport.node import run, serve
+from formation_gnc.transport.module_node import ModuleNode
+from formation_gnc.transport.node import serve
+from formation_gnc.transport.process import run
 
 
 class Satellite:
-    """Navigation, guidance and controller of a deputy."""
+    """The modules of a deputy."""
 
     def __init__(self) -> None:
-        """Make the nodes, who speaks before who listens."""
+        """Make the nodes in the table's order: who publishes before who subscribes."""
         bus = IntraProcessBus()
-        self.nodes = NavigationNode(bus), GuidanceNode(bus), ControllerNode(bus)
+        self.nodes = [ModuleNode(row, bus) for row in GRAPH]
 
     def spin(self) -> None:
         """Work until asked to stop."""
@@ -32,4 +32,4 @@ class Satellite:
 
 def main() -> int:
     """Run the process."""
-    return run(Satellite, Satellite.spin)
+    return run(Satellite)

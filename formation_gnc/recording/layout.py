@@ -4,11 +4,22 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
+from formation_gnc.flight import topics
+from formation_gnc.flight.graph import MODULES
+
 LAYOUT = "foxglove_layout.json"
 """File name of the layout among a bag's attachments."""
 
 AXES = ("x radial", "y along-track", "z cross-track")
-PARTS = ("navigation", "guidance", "controller")
+
+
+STATES = (
+    (topics.STATUS, "algorithm"),
+    (topics.STATUS, "fallback"),
+    (topics.ESTIMATE, "status"),
+    (topics.MEASUREMENT, "eclipse"),
+)
+"""Fields that are drawn as bands of states."""
 
 
 def foxglove_layout(deputies: Sequence[str]) -> str:
@@ -31,7 +42,7 @@ def foxglove_layout(deputies: Sequence[str]) -> str:
         return {axis: f"{topic}[{first + index}]" for index, axis in enumerate(AXES)}
 
     def tab(name: str) -> dict[str, Any]:
-        truth = f'/truth.deputies[:]{{name=="{name}"}}.relative_state'
+        truth = f'{topics.TRUTH.name}.deputies[:]{{name=="{name}"}}.relative_state'
         path = plot(
             f"{name}-path",
             "Path in the Hill frame: radial over along-track [m]",
@@ -40,13 +51,15 @@ def foxglove_layout(deputies: Sequence[str]) -> str:
             xAxisPath={"value": f"{truth}[1]", "enabled": True},
         )
         state = plot(f"{name}-truth", "True relative position [m]", by_axis(truth))
-        estimate = plot(f"{name}-estimate", "Estimated position [m]", by_axis(f"/{name}/estimate.relative_state"))
-        target = plot(f"{name}-target", "Target position [m]", by_axis(f"/{name}/target.relative_state"))
-        thrust = plot(f"{name}-thrust", "Thrust [N]", by_axis(f"/{name}/thrust.force"))
+        estimate = plot(
+            f"{name}-estimate", "Estimated position [m]", by_axis(f"{topics.ESTIMATE.of(name)}.relative_state")
+        )
+        target = plot(f"{name}-target", "Target position [m]", by_axis(f"{topics.TARGET.of(name)}.relative_state"))
+        thrust = plot(f"{name}-thrust", "Thrust [N]", by_axis(f"{topics.THRUST.of(name)}.force"))
         timing = plot(
             f"{name}-timing",
             "Compute time [s]",
-            {part: f'/{name}/timing{{node=="{part}"}}.compute_time' for part in PARTS},
+            {part: f'{topics.TIMING.of(name)}{{node=="{part}"}}.compute_time' for part in MODULES},
         )
         states = panel(
             "StateTransitions",
@@ -54,8 +67,12 @@ def foxglove_layout(deputies: Sequence[str]) -> str:
             foxglovePanelTitle="Law, filter and shadow",
             isSynced=True,
             paths=[
-                {"value": f"/{name}/{field}", "label": field, "timestampMethod": "headerStamp"}
-                for field in ("status.algorithm", "status.fallback", "estimate.status", "measurement.eclipse")
+                {
+                    "value": f"{topic.of(name)}.{field}",
+                    "label": f"{topic.name}.{field}",
+                    "timestampMethod": "headerStamp",
+                }
+                for topic, field in STATES
             ],
         )
         left = _stacked("column", [path, states])
@@ -71,11 +88,11 @@ def foxglove_layout(deputies: Sequence[str]) -> str:
         foxglovePanelTitle="Hill frame, drawn by the display node",
         followTf="hill",
         followMode="follow-pose",
-        topics={"/markers": {"visible": True}},
+        topics={topics.MARKERS.name: {"visible": True}},
         cameraState={"distance": 2000.0, "phi": 60.0, "thetaOffset": 45.0, "perspective": True, "fovy": 45.0},
     )
-    events = panel("RawMessages", "events", foxglovePanelTitle="Events", topicPath="/events")
-    state_of_run = panel("DiagnosticSummary", "run", foxglovePanelTitle="Run", topicToRender="/diagnostics")
+    events = panel("RawMessages", "events", foxglovePanelTitle="Events", topicPath=topics.EVENTS.name)
+    state_of_run = panel("DiagnosticSummary", "run", foxglovePanelTitle="Run", topicToRender=topics.DIAGNOSTICS.name)
     said = panel("RosOut", "rosout", foxglovePanelTitle="What the nodes said")
     side = _stacked("column", [scene, state_of_run, events, said])
     layout = {

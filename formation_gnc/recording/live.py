@@ -16,15 +16,13 @@ from foxglove.websocket import (
 )
 
 from formation_gnc.errors import ConfigurationError
+from formation_gnc.flight import topics
 from formation_gnc.recording.layout import foxglove_layout
 from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.writer import TopicDefinition
 
 NAP = 0.02
 """Wall time (s) between looks at what the viewer asks for."""
-
-MEASUREMENT = "/measurement"
-"""End of the name of a topic that every deputy has."""
 
 
 class LiveView:
@@ -82,12 +80,12 @@ class LiveView:
         self._channels[topic] = foxglove.Channel(
             topic, schema=schema, message_encoding=definition.message_encoding, context=self._context
         )
-        if topic.endswith(MEASUREMENT):
+        if topics.deputies_in([topic]):
             self._write_layout()
 
     def _write_layout(self) -> None:
         if self._layout is not None:
-            deputies = sorted(topic.split("/")[1] for topic in self._channels if topic.endswith(MEASUREMENT))
+            deputies = topics.deputies_in(self._channels)
             try:
                 self._layout.write_text(foxglove_layout(deputies))
             except OSError as error:
@@ -144,7 +142,7 @@ class Player(ServerListener):
 
     def play(self, ended: Callable[[], bool]) -> None:
         """Play, and wait at the end for a viewer to seek, until `ended` says so."""
-        topics = [topic for topic in self._bag.topics if self._bag.definition(topic)[0] is not None]
+        defined = [topic for topic in self._bag.topics if self._bag.definition(topic)[0] is not None]
         self._sought = self._bag.start_ns
         while not ended():
             if self._sought is None:
@@ -153,7 +151,7 @@ class Player(ServerListener):
             start, self._sought, self._ended = self._sought, None, False
             self._time = start
             self._set_pace()
-            for topic, data, stamp in self._bag.messages(topics, start):
+            for topic, data, stamp in self._bag.messages(defined, start):
                 if stamp > self._time and not self._wait_for(stamp, ended):
                     break
                 self.view.show(topic, data, stamp)

@@ -2,6 +2,7 @@
 
 from collections import deque
 
+from formation_gnc.flight import topics
 from formation_gnc.recording.writer import BagWriter
 
 
@@ -20,7 +21,7 @@ class Snapshot:
 
     def write(self, topic: str, data: bytes, stamp_ns: int, sequence: int) -> None:
         """Keep one message; takes what `BagWriter.write` takes."""
-        if topic == "/clock" and stamp_ns < self._latest - self._duration_ns:
+        if topic == topics.CLOCK.name and stamp_ns < self._latest - self._duration_ns:
             self._kept.clear()
             self._latest = stamp_ns
         self._kept.append((topic, data, stamp_ns, sequence))

@@ -1,269 +1,255 @@
-"""Flies recorded inputs through parts again: the same parameters give the recorded outputs, bit for bit.
+"""Runs recorded inputs through modules again: the same parameters give the recorded outputs, bit for bit.
 
-What flew is taken from the bag alone. Parameters are its metadata records `parameters NODE`; changes in
-flight are either scheduled there, or are the `/events` of kind `parameters` and are adopted again at their
-tick. A part is given an input only where it was given it in the recorded run, which its `timing` tells; one
-that had been started again, whose messages are numbered from 1 again, is here too, with the parameters that
-it was started with then, `parameters NODE from STAMP`.
+What flew is taken from the bag alone. Parameters are its metadata records `parameters NODE`; changes in flight
+are either scheduled there, or are the `/events` of kind PARAMETERS and are committed again at their tick. A
+module is given an input only where it was given it in the recorded run, which its `timing` tells; one that had
+been started again, whose messages are numbered from 1 again, is here too, with the parameters that it was
+started with then, `parameters NODE from STAMP`.
 
-The truth is recorded, not flown: changed parts say what they would have commanded, and nothing answers them.
+The truth is recorded, not flown: changed modules say what they would have commanded, and nothing answers them.
 """
 
 import json
-import re
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any
 
-from formation_gnc.control.controller_manager import ControllerManager, ControllerParameters
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.flight.module import Configuration, FlightModule
-from formation_gnc.flight.synchronizer import StampSynchronizer
-from formation_gnc.guidance.guidance import Guidance, GuidanceParameters
-from formation_gnc.navigation.navigation_filter import NavigationFilter, NavigationParameters
-from formation_gnc.parameters import OWN_OF_ROS, dump, load, to_json
+from formation_gnc.flight import topics
+from formation_gnc.flight.graph import MODULES, ModuleInstance, Row, modules_named
+from formation_gnc.parameters import OWN_OF_ROS, load
 from formation_gnc.recording.provenance import parameters_record
 from formation_gnc.recording.reader import Bag
 from formation_gnc.records import EstimateStatus, Event, EventKind, Timing
-from formation_gnc.sil.runner import Sink
+from formation_gnc.sil.simulation import Sink
 from formation_gnc.types import NANOSECONDS
 
-
-@dataclass(frozen=True)
-class Kind:
-    """How a part is built, and which of its deputy's topics it hears and fills."""
-
-    schema: type
-    build: Callable[[str, Any], Any]
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-
-
-KINDS = {
-    "navigation": Kind(NavigationParameters, NavigationFilter, ("measurement",), ("estimate",)),
-    "guidance": Kind(GuidanceParameters, Guidance, ("estimate",), ("target", "separation")),
-    "controller": Kind(ControllerParameters, ControllerManager, ("estimate", "target"), ("thrust", "status")),
-}
-
-Read = Callable[[str, bytes], Any]
+Decode = Callable[[str, bytes], Any]
 """The record of a message, given its topic and CDR bytes."""
 
 Copy = Callable[[str, bytes, int], None]
-"""Takes what was recorded and is not flown again: topic, CDR bytes, stamp in ns."""
+"""Takes what was recorded and is not replayed: topic, CDR bytes, stamp in ns."""
 
 
-class ReplayedPart:
-    """One part, flown again."""
+class ReplayedModule:
+    """One module, run again; started again where it had been in the recorded run."""
 
     def __init__(self, node: str, values: Mapping[str, Any]) -> None:
         """Build it from its parameters; raises ConfigurationError for what cannot be flown."""
+        self.node, self.deputy = node, topics.deputy_of(node)
+        self.row: Row = MODULES[node.rpartition("/")[2]]
         self.restarts: dict[int, Any] = {}
-        """Parameters by the stamps with whose answers a process began that had been started again."""
-        self.node = node
-        self.kind = KINDS[node.rpartition("/")[2]]
-        self.inputs = [_sibling(node, name) for name in self.kind.inputs]
+        """Parameters by the stamps of the first answers of processes that had been started again."""
+        self.answer, self.timing = self.row.answer.of(self.deputy), topics.TIMING.of(self.deputy)
         self.orphans = 0
         """Ticks whose input the bag lacks though it was answered."""
-        self._heard_last = True
-        self.start(load(self.kind.schema, values))
+        self._was_given_input = True
+        self.start(load(self.row.parameters, values))
 
     def start(self, parameters: Any) -> None:
-        """Begin anew, as a process that was just started with these parameters."""
+        """Start as a process with these parameters does."""
         self.parameters = parameters
-        deputy = self.node.rpartition("/")[0].strip("/")
-        fleet = getattr(parameters, "fleet", ())
-        self.others = [f"/{name}/estimate" for name in fleet if name != deputy]
-        """Inputs that may be missing."""
-        self._part: FlightModule[Any, Any] = self.kind.build(self.node, self.parameters)
-        self._meeting = StampSynchronizer((*self.inputs, *self.others), len(self.inputs))
+        self.instance = ModuleInstance(self.row, self.deputy, parameters)
 
-    def meet(self, records: Mapping[str, Any]) -> list[Any] | None:
-        """Its inputs at a tick, of the records there are by topic; none when it could not answer."""
-        inputs = None
-        for topic in (*self.others, *reversed(self.inputs)):  # who sets the pace comes last
-            if topic in records:
-                inputs = self._meeting.take(topic, records[topic])
-        return inputs
+    def is_given_input(self, stamp: int, was_given: bool, recorded: Any) -> bool:
+        """Whether it gets a tick's input; starts it again where it had been.
 
-    def tick(self, time: int, inputs: list[Any], swaps: list[Event]) -> tuple[tuple[Any, ...], list[Event]]:
-        """Outputs, none while there is no state, and events of a tick on which `swaps` were recorded."""
-        scheduled = [_new_values(foreseen) for at, foreseen in self._part.foreseen if at <= time]
-        for swap in swaps:
-            changes = {change.name: change.new_value for change in swap.changes}
-            if changes in scheduled:
-                scheduled.remove(changes)  # the schedule brings it about by itself
-            else:
-                self._part.commit(self._part.stage({name: json.loads(value) for name, value in changes.items()}))
-        answer = self._part.on_tick(*inputs)  # type: ignore[attr-defined]
-        records = () if answer is None else answer if isinstance(answer, tuple) else (answer,)
-        return records, self._part.take_events()
-
-    def heard(self, time: int, is_heard: bool, recorded: Any) -> bool:
-        """Whether to give it this tick's input; starts it again where it had been.
-
-        recorded: its output in the recorded run, if there is one.
+        Args:
+            stamp: of the tick, ns.
+            was_given: whether it was in the recorded run.
+            recorded: its answer in that run, if there is one.
         """
         acquired = getattr(recorded, "status", None) == EstimateStatus.ACQUIRED
-        if is_heard and (time in self.restarts or (acquired and not self._heard_last)):
-            self.start(self.restarts.get(time, self.parameters))
-        self._heard_last = is_heard
-        return is_heard
+        if was_given and (stamp in self.restarts or (acquired and not self._was_given_input)):
+            self.start(self.restarts.get(stamp, self.parameters))
+        self._was_given_input = was_given
+        return was_given
 
-
-def _new_values(foreseen: Configuration[Any, Any]) -> dict[str, str]:
-    """Values that a scheduled change brings, by name, as its event will have them."""
-    values = dump(foreseen.parameters)
-    return {name: to_json(values[name]) for name in foreseen.changes}
+    def respond(self, stamp: int, inputs: Sequence[Any], swaps: Sequence[Event]) -> list[tuple[str, Any]]:
+        """Outputs by topic at a tick on which `swaps` of parameters were recorded."""
+        module = self.instance.module
+        due = module.scheduled_changes(stamp)
+        for swap in swaps:
+            changes = {each.name: each.new_value for each in swap.changes}
+            if changes in due:
+                due.remove(changes)  # the schedule brings it about by itself
+            else:
+                module.commit(module.stage({name: json.loads(text) for name, text in changes.items()}))
+        return self.instance.respond(inputs)
 
 
 def parameters_of(bag: Bag, node: str, start: int | None = None) -> dict[str, Any]:
     """Parameters that a node was started with, as the bag has them; empty when it has none.
 
-    start: stamp (ns) of its first answer after it had been started again; none for its first start.
+    start: stamp (ns) of its first answer after it had been started again; None for its first start.
     """
     recorded = bag.metadata.get(parameters_record(node, start), {})
     return {name: json.loads(text) for name, text in recorded.items() if not name.startswith(OWN_OF_ROS)}
 
 
-def nodes_of(bag: Bag, kinds: Collection[str]) -> list[str]:
-    """Full names of the bag's nodes of the named kinds, in the order in which they answer."""
-    unknown = [kind for kind in kinds if kind not in KINDS]
-    if unknown or not kinds:
-        raise ConfigurationError(f"nodes {', '.join(unknown) or 'none'}: must be some of {', '.join(KINDS)}")
-    deputies = sorted(topic.split("/")[1] for topic in bag.topics if re.fullmatch("/[^/]+/measurement", topic))
+def nodes_of(bag: Bag, modules: Sequence[str]) -> list[str]:
+    """Full names of the bag's nodes of the named modules, in the order in which they answer."""
+    rows, deputies = modules_named(modules), topics.deputies_in(bag.topics)
     if not deputies:
-        raise ConfigurationError(f"{bag.path}: has no measurements to fly again")
-    return [f"/{deputy}/{kind}" for kind in KINDS if kind in kinds for deputy in deputies]
+        raise ConfigurationError(f"{bag.path}: has no measurements to replay")
+    return [f"/{deputy}/{row.name}" for row in rows for deputy in deputies]
 
 
-def replay(bag: Bag, parameters: Mapping[str, Mapping[str, Any]], read: Read, sink: Sink, copy: Copy) -> list[str]:
-    """Fly a bag's inputs through parts again, tick by tick.
+def replay(bag: Bag, parameters: Mapping[str, Mapping[str, Any]], decode: Decode, sink: Sink, copy: Copy) -> list[str]:
+    """Run a bag's inputs through modules again, tick by tick.
 
     Args:
         bag: the recorded run.
-        parameters: of every node to fly again, by full name, in the order of `nodes_of`. Those that are not
-            as recorded go before what is recorded at every start.
-        read: makes records of messages.
-        sink: takes topic and record of all that the parts say.
+        parameters: of every node to replay, by full name, in the order of `nodes_of`. Those that are not as
+            recorded override what is recorded at every start.
+        decode: makes records of messages.
+        sink: takes topic and record of all that the modules publish.
         copy: takes every other message as it was recorded, sorted by stamp.
 
     Returns:
-        What could not be flown as it was, in words.
+        What could not be replayed as it was, in words.
 
     Raises:
         ConfigurationError: parameters that cannot be flown, or a recorded change that these do not allow.
     """
-    parts = []
+    modules = []
     for node, values in parameters.items():
         if not values:
             raise ConfigurationError(f"{bag.path}: has no parameters of {node}; give them in a file")
         try:
-            parts.append(ReplayedPart(node, values))
+            modules.append(ReplayedModule(node, values))
         except ConfigurationError as error:
             raise ConfigurationError(f"{node}: {error}") from None
-    outputs = {_sibling(part.node, output) for part in parts for output in part.kind.outputs}
-    answers = {part.node: _sibling(part.node, part.kind.outputs[0]) for part in parts}
-    restarts = bag.restarts(list(answers.values()))
-    remarks = []
-    for part in parts:
-        recorded, given, latest = parameters_of(bag, part.node), parameters[part.node], part.parameters
-        changes = {name: value for name, value in given.items() if value != recorded.get(name)}
-        for stamp in sorted(restarts[answers[part.node]]):
-            values = parameters_of(bag, part.node, stamp)
-            if values:
-                latest = load(part.kind.schema, values | changes)
-            else:
-                remarks.append(
-                    f"{part.node} was started again at {stamp / NANOSECONDS:g} s; the bag lacks with which "
-                    "parameters, so it flies with those before"
-                )
-            part.restarts[stamp] = latest
-    tick: dict[str, list[bytes]] = {}
-    time = None
-    for stamp, topic, messages in bag.by_stamp(list(bag.topics)):
-        if stamp != time and time is not None:
-            _fly_tick(bag, parts, outputs, time, tick, read, sink, copy)
-            tick = {}
-        time = stamp
-        tick[topic] = messages
-    if time is not None:
-        _fly_tick(bag, parts, outputs, time, tick, read, sink, copy)
-    orphans = sum(part.orphans for part in parts)
+    remarks = list(_note_restarts(bag, modules, parameters))
+    _Replay(bag, modules, decode, sink, copy).run()
+    orphans = sum(module.orphans for module in modules)
     if orphans:
         remarks.append(f"{orphans} answers as recorded, not flown: the bag lacks what they answer")
     return remarks
 
 
-def _fly_tick(
-    bag: Bag,
-    parts: list[ReplayedPart],
-    outputs: Collection[str],
-    time: int,
-    tick: Mapping[str, list[bytes]],
-    read: Read,
-    sink: Sink,
-    copy: Copy,
-) -> None:
-    nodes = {part.node for part in parts}
-    swaps: dict[str, list[Event]] = {}
-    timed: set[str] = set()
-    for topic, messages in tick.items():
-        for data in messages:
-            if topic == "/events":
-                event = read(topic, data)
-                if event.node in nodes:
-                    if event.kind == EventKind.PARAMETERS:
-                        swaps.setdefault(event.node, []).append(event)
-                    continue
-            elif topic.endswith("/timing"):
-                node = _sibling(topic, read(topic, data).node)
-                timed.add(node)
-                if node in nodes:
-                    continue
-            if topic not in outputs:
-                copy(topic, data, time)
-    said: dict[str, Any] = {}
-    for part in parts:
-        there = {
-            topic: said[topic] if topic in outputs else read(topic, tick[topic][-1])
-            for topic in (*part.inputs, *part.others)
-            if topic in (said if topic in outputs else tick)
-        }
-        timing = _sibling(part.node, "timing")
-        is_timed = timing in bag.topics and bag.topics[timing].count > 0
-        output = _sibling(part.node, part.kind.outputs[0])
-        recorded = read(output, tick[output][-1]) if output in tick else None
-        if _sibling(part.node, "measurement") not in tick:
-            continue  # no tick of this deputy
-        # A node that was killed in this tick may have answered without the time to say how long it took.
-        has_finished = part.node in timed or not is_timed
-        is_heard = part.heard(time, has_finished or recorded is not None, recorded)
-        inputs = part.meet(there)  # even when it was silent: who is waited for next depends on it
+def _note_restarts(
+    bag: Bag, modules: Sequence[ReplayedModule], parameters: Mapping[str, Mapping[str, Any]]
+) -> Iterator[str]:
+    """Tell every module when it is to start again, and with what; yields what the bag lacks for that."""
+    restarts = bag.restarts([module.answer for module in modules])
+    for module in modules:
+        recorded, latest = parameters_of(bag, module.node), module.parameters
+        given = parameters[module.node]
+        changes = {name: value for name, value in given.items() if value != recorded.get(name)}
+        for stamp in sorted(restarts[module.answer]):
+            values = parameters_of(bag, module.node, stamp)
+            if values:
+                latest = load(module.row.parameters, values | changes)
+            else:
+                yield (
+                    f"{module.node} was started again at {stamp / NANOSECONDS:g} s; the bag lacks with which "
+                    "parameters, so it flies with those before"
+                )
+            module.restarts[stamp] = latest
+
+
+@dataclass
+class _RecordedTick:
+    """Recorded messages of one stamp by topic, and what they say of the replayed modules."""
+
+    stamp: int
+    messages: dict[str, list[bytes]] = field(default_factory=dict)
+    swaps: dict[str, list[Event]] = field(default_factory=dict)
+    """Changes of parameters by node."""
+    timed: set[str] = field(default_factory=set)
+    """Nodes that finished the tick."""
+
+
+class _Replay:
+    def __init__(self, bag: Bag, modules: Sequence[ReplayedModule], decode: Decode, sink: Sink, copy: Copy) -> None:
+        self._bag, self._modules, self._decode, self._sink, self._copy = bag, modules, decode, sink, copy
+        self._nodes = {module.node for module in modules}
+        self._outputs = {topic for module in modules for topic in module.instance.outputs}
+        self._timings = {name for name, topic in bag.topics.items() if topic.count and _is_timing(name)}
+
+    def run(self) -> None:
+        """Replay tick by tick."""
+        tick: _RecordedTick | None = None
+        for stamp, topic, messages in self._bag.by_stamp(list(self._bag.topics)):
+            if tick is None or stamp != tick.stamp:
+                if tick is not None:
+                    self._replay_tick(tick)
+                tick = _RecordedTick(stamp)
+            tick.messages[topic] = messages
+        if tick is not None:
+            self._replay_tick(tick)
+
+    def _replay_tick(self, tick: _RecordedTick) -> None:
+        for topic, messages in tick.messages.items():
+            for data in messages:
+                if not self._is_replaced(tick, topic, data):
+                    self._copy(topic, data, tick.stamp)
+        records: dict[str, Any] = {}
+        for module in self._modules:
+            if topics.MEASUREMENT.of(module.deputy) in tick.messages:
+                self._replay_module(tick, module, records)
+
+    def _is_replaced(self, tick: _RecordedTick, topic: str, data: bytes) -> bool:
+        """Whether the replay publishes this message's like; notes swaps and finished ticks on the way."""
+        if topic == topics.EVENTS.name:
+            event = self._decode(topic, data)
+            if event.node in self._nodes and event.kind == EventKind.PARAMETERS:
+                tick.swaps.setdefault(event.node, []).append(event)
+            return event.node in self._nodes
+        if _is_timing(topic):
+            node = f"/{topics.deputy_of(topic)}/{self._decode(topic, data).node}"
+            tick.timed.add(node)
+            return node in self._nodes
+        return topic in self._outputs
+
+    def _replay_module(self, tick: _RecordedTick, module: ReplayedModule, records: dict[str, Any]) -> None:
+        is_timed = module.timing in self._timings
+        recorded = self._recorded(tick, module.answer)
+        # A node that was killed in this tick may have answered before it could say how long it took.
+        has_finished = module.node in tick.timed or not is_timed
+        is_given = module.is_given_input(tick.stamp, has_finished or recorded is not None, recorded)
+        inputs = self._inputs(tick, module, records)  # even of a silent one: who is awaited next depends on it
         if inputs is None and recorded is not None:
-            # A node that was killed may have reached others with what the recorder never got.
-            for topic in (_sibling(part.node, name) for name in part.kind.outputs):
-                for data in tick.get(topic, ()):
-                    said[topic] = read(topic, data)
-                    copy(topic, data, time)
-            part.orphans += 1
-            continue
-        if not is_heard or inputs is None:
-            continue
+            self._take_recorded(tick, module, records)
+            return
+        if not is_given or inputs is None:
+            return
         started = perf_counter()
-        records, events = part.tick(time, inputs, swaps.get(part.node, []))
-        for name, record in zip(part.kind.outputs, records, strict=False):
-            topic = _sibling(part.node, name)
-            if record is None or not (has_finished or topic in tick):
-                continue
-            said[topic] = record
-            sink(topic, record)
+        outputs = module.respond(tick.stamp, inputs, tick.swaps.get(module.node, ()))
+        events = module.instance.take_events()
+        for topic, record in outputs:
+            if has_finished or topic in tick.messages:
+                records[topic] = record
+                self._sink(topic, record)
         if is_timed:
-            sink(timing, Timing(time, part.node.rpartition("/")[2], round((perf_counter() - started) * NANOSECONDS)))
+            spent = round((perf_counter() - started) * NANOSECONDS)
+            self._sink(module.timing, Timing(tick.stamp, module.row.name, spent))
         for event in events:
-            sink("/events", event)
+            self._sink(topics.EVENTS.name, event)
+
+    def _inputs(self, tick: _RecordedTick, module: ReplayedModule, records: Mapping[str, Any]) -> Sequence[Any] | None:
+        """A module's inputs: as replayed where they are outputs of the replay, else as recorded."""
+        there = {}
+        for topic in (*module.instance.inputs, *module.instance.inputs_of_others):
+            record = records.get(topic) if topic in self._outputs else self._recorded(tick, topic)
+            if record is not None:
+                there[topic] = record
+        return module.instance.collect(there)
+
+    def _take_recorded(self, tick: _RecordedTick, module: ReplayedModule, records: dict[str, Any]) -> None:
+        """Copy an answer to what the bag lacks: a killed node may have reached others with it."""
+        for topic in module.instance.outputs:
+            for data in tick.messages.get(topic, ()):
+                records[topic] = self._decode(topic, data)
+                self._copy(topic, data, tick.stamp)
+        module.orphans += 1
+
+    def _recorded(self, tick: _RecordedTick, topic: str) -> Any:
+        messages = tick.messages.get(topic)
+        return self._decode(topic, messages[-1]) if messages else None
 
 
-def _sibling(name: str, other: str) -> str:
-    """Full name of what stands beside a node or topic in its deputy's namespace."""
-    return f"{name.rpartition('/')[0]}/{other}"
+def _is_timing(topic: str) -> bool:
+    return topic == topics.TIMING.of(topics.deputy_of(topic))

@@ -11,10 +11,9 @@ from typing import Any
 import yaml
 
 import formation_gnc
-from formation_gnc.control.controller_manager import ControllerParameters
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.guidance.guidance import GuidanceParameters, check_places
-from formation_gnc.navigation.navigation_filter import NavigationParameters
+from formation_gnc.flight.graph import GRAPH
+from formation_gnc.guidance.guidance import check_places
 from formation_gnc.parameters import dump, load, read_yaml
 from formation_gnc.plant.plant import PlantParameters
 
@@ -25,27 +24,19 @@ NODE = re.compile(r"/?([A-Za-z0-9_]+|\*\*?)(/([A-Za-z0-9_]+|\*\*?))*")
 
 
 @dataclass(frozen=True)
-class DeputySetup:
-    """Checked parameters of one deputy's parts."""
-
-    navigation: NavigationParameters
-    guidance: Any
-    controller: Any
-
-
-@dataclass(frozen=True)
 class Scenario:
     """A run, ready to fly: every parameter of every node, checked."""
 
     name: str
     plant: PlantParameters
-    deputies: Mapping[str, DeputySetup]
+    deputies: Mapping[str, Mapping[str, Any]]
+    """Parameters of every deputy's modules, by deputy and module."""
 
     def parameters(self) -> dict[str, dict[str, Any]]:
         """All parameters by full node name, then by dotted name."""
         nodes: dict[str, Any] = {"/plant": self.plant}
-        for name, setup in self.deputies.items():
-            nodes |= {f"/{name}/{part}": value for part, value in vars(setup).items()}
+        for name, modules in self.deputies.items():
+            nodes |= {f"/{name}/{module}": values for module, values in modules.items()}
         return {node: dump(values) for node, values in nodes.items()}
 
     def text(self, extra: Mapping[str, Mapping[str, Any]] | None = None) -> str:
@@ -80,14 +71,10 @@ def load_scenario(name: str, overrides: Mapping[str, Mapping[str, Any]] | None =
     try:
         plant = _load(PlantParameters, sections, "/plant")
         deputies = {
-            deputy: DeputySetup(
-                _load(NavigationParameters, sections, f"/{deputy}/navigation"),
-                _load(GuidanceParameters, sections, f"/{deputy}/guidance"),
-                _load(ControllerParameters, sections, f"/{deputy}/controller"),
-            )
+            deputy: {row.name: _load(row.parameters, sections, f"/{deputy}/{row.name}") for row in GRAPH}
             for deputy in plant.deputies
         }
-        check_places({name: setup.guidance for name, setup in deputies.items()})
+        check_places({name: modules["guidance"] for name, modules in deputies.items()})
     except ConfigurationError as error:
         raise ConfigurationError(f"{path.name}: {error}") from None
     return Scenario(path.stem, plant, deputies)

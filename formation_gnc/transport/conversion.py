@@ -18,7 +18,7 @@ from formation_gnc.transport.cdr import Codec
 from formation_gnc.transport.fields import Field
 
 PACKAGE = "formation_gnc_msgs"
-"""Where the messages of records are defined."""
+"""Where the messages of records are defined that name no other package."""
 
 _CODES = {
     "boolean": "?",
@@ -32,7 +32,8 @@ _TIMES = [("builtin_interfaces", "msg", name) for name in ("Time", "Duration")]
 
 def type_name(record_type: type[Record]) -> str:
     """Name of the message type that a record mirrors, such as ``formation_gnc_msgs/msg/Thrust``."""
-    return f"{PACKAGE}/msg/{record_type.message}"
+    package, _, name = record_type.message.rpartition("/")
+    return f"{package or PACKAGE}/msg/{name}"
 
 
 def message_type(record_type: type[Record]) -> Any:

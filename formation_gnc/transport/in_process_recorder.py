@@ -3,16 +3,12 @@
 from collections.abc import Callable
 from typing import Any
 
-from rclpy.serialization import serialize_message
-from rosgraph_msgs.msg import Clock
-
 from formation_gnc import records
 from formation_gnc.errors import ConfigurationError
+from formation_gnc.flight import topics
 from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.writer import BagWriter, TopicDefinition
-from formation_gnc.transport import topics
-from formation_gnc.transport.conversion import from_cdr, message_type, to_cdr
-from formation_gnc.types import NANOSECONDS
+from formation_gnc.transport.conversion import from_cdr, to_cdr, type_name
 
 
 class InProcessRecorder:
@@ -24,12 +20,10 @@ class InProcessRecorder:
         self._counts: dict[str, int] = {}
 
     def __call__(self, topic: str, record: Any) -> None:
-        """Write one record; the clock follows each truth, as the plant publishes it."""
-        self._write(topic, message_type(type(record)), to_cdr(record), record.time)
-        if isinstance(record, records.Truth):
-            clock = Clock()
-            clock.clock.sec, clock.clock.nanosec = divmod(record.time, NANOSECONDS)
-            self._write(topics.CLOCK, Clock, serialize_message(clock), record.time)
+        """Write one record."""
+        if topic not in self._counts:
+            self._bag.add_topic(topic, type_name(type(record)), topics.QUEUE_DEPTH)
+        self._append(topic, to_cdr(record), record.time)
 
     def copy(self, source: Bag, topic: str, data: bytes, time: int) -> None:
         """Write a message of another bag as it is."""
@@ -40,16 +34,11 @@ class InProcessRecorder:
                 schema.name, schema.data, schema.encoding, channel.message_encoding, channel.metadata
             )
             self._bag.add_defined_topic(topic, definition)
-            self._counts[topic] = 0
-        self._counts[topic] += 1
-        self._bag.write(topic, data, time, self._counts[topic])
+        self._append(topic, data, time)
 
-    def _write(self, topic: str, kind: Any, data: bytes, time: int) -> None:
-        if topic not in self._counts:
-            self._bag.add_topic(topic, f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}", topics.DEPTH)
-            self._counts[topic] = 0
-        self._counts[topic] += 1
-        self._bag.write(topic, data, time, self._counts[topic])
+    def _append(self, topic: str, data: bytes, time: int) -> None:
+        self._counts[topic] = number = self._counts.get(topic, 0) + 1
+        self._bag.write(topic, data, time, number)
 
 
 def reader(bag: Bag) -> Callable[[str, bytes], Any]:

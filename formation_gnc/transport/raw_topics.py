@@ -9,12 +9,13 @@ from rclpy.node import Node
 from rclpy.qos import QoSDurabilityPolicy
 
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.transport import topics
+from formation_gnc.flight import topics
 from formation_gnc.transport.conversion import message_class
+from formation_gnc.transport.qos import quality
 from formation_gnc.types import NANOSECONDS
 
-Hear = Callable[[bytes, int, int | None], None]
-"""Takes a message's CDR bytes, stamp in ns and its publisher's number of it, if the middleware has one."""
+Callback = Callable[[bytes, int, int | None], None]
+"""Takes a message's CDR bytes, stamp in ns and its publisher's sequence number, if the middleware has one."""
 
 
 class RawTopics:
@@ -24,7 +25,7 @@ class RawTopics:
     otherwise.
     """
 
-    def __init__(self, node: Node, open_topic: Callable[[str, str, bool], Hear]) -> None:
+    def __init__(self, node: Node, open_topic: Callable[[str, str, bool], Callback]) -> None:
         """Subscribe to nothing yet.
 
         Args:
@@ -49,11 +50,11 @@ class RawTopics:
     def _subscribe(self, topic: str, type_name: str) -> None:
         kind = message_class(type_name)
         offers = self._node.get_publishers_info_by_topic(topic)
-        quality = topics.quality()
+        qos = quality()
         if any(offer.qos_profile.durability == QoSDurabilityPolicy.VOLATILE for offer in offers):
-            quality.durability = QoSDurabilityPolicy.VOLATILE
-        hear = self._open(topic, type_name, quality.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL)
-        is_clock = topic == topics.CLOCK
+            qos.durability = QoSDurabilityPolicy.VOLATILE
+        take = self._open(topic, type_name, qos.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL)
+        is_clock = topic == topics.CLOCK.name
         stamped = is_clock or "std_msgs/Header" in list(kind.get_fields_and_field_types().values())[:1]
 
         def receive(data: bytes, about: dict[str, Any]) -> None:
@@ -62,20 +63,20 @@ class RawTopics:
                 stamp = self._time
             if is_clock:
                 self._time = stamp
-            hear(data, stamp, about["publication_sequence_number"])
+            take(data, stamp, about["publication_sequence_number"])
 
-        self._node.create_subscription(kind, topic, _as_executor_calls(receive), quality, raw=True)
+        self._node.create_subscription(kind, topic, _as_executor_calls(receive), qos, raw=True)
 
 
 def _as_executor_calls(receive: Callable[[bytes, dict[str, Any]], None]) -> Callable[..., None]:
     """Take a message and what is known about it as two arguments or, from the EventsExecutor, as one pair."""
 
     @wraps(receive)  # rclpy looks at the signature to see whether it is wanted
-    def take(*given: Any) -> None:
+    def call(*given: Any) -> None:
         data, about = given if len(given) == 2 else given[0]
         receive(data, about)
 
-    return take
+    return call
 
 
 def first_stamp(data: bytes) -> int:

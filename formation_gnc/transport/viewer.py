@@ -7,11 +7,11 @@ from rclpy.context import Context
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
+from formation_gnc.flight import topics
 from formation_gnc.recording.live import LiveView
 from formation_gnc.recording.writer import TopicDefinition
-from formation_gnc.transport import topics
 from formation_gnc.transport.node import Executor
-from formation_gnc.transport.raw_topics import Hear, RawTopics
+from formation_gnc.transport.raw_topics import Callback, RawTopics
 
 LOOK_PERIOD = 0.5
 """Wall time (s) between looks for new topics."""
@@ -25,16 +25,16 @@ def show_graph(view: LiveView, ended: Callable[[], bool]) -> None:
     executor = Executor(context=context)
     executor.add_node(node)
 
-    def open_topic(topic: str, type_name: str, _latched: bool) -> Hear:
-        view.add(topic, TopicDefinition.installed(type_name, topics.DEPTH))
-        is_clock = topic == topics.CLOCK
+    def open_topic(topic: str, type_name: str, _latched: bool) -> Callback:
+        view.add(topic, TopicDefinition.installed(type_name, topics.QUEUE_DEPTH))
+        is_clock = topic == topics.CLOCK.name
 
-        def hear(data: bytes, stamp: int, _number: int | None) -> None:
+        def show(data: bytes, stamp: int, _number: int | None) -> None:
             if is_clock:
                 view.tell_time(stamp)
             view.show(topic, data, stamp)
 
-        return hear
+        return show
 
     everything = RawTopics(node, open_topic)
     try:

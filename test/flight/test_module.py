@@ -40,6 +40,9 @@ class Amplifier(FlightModule[Settings, float]):
             raise DesignError(f"gain {parameters.gain:g} is too much at lag {parameters.lag:g}")
         return parameters.gain * parameters.lag
 
+    def on_tick(self) -> float:
+        return self.configuration.design
+
     def activate(self, old: Configuration[Settings, float], new: Configuration[Settings, float]) -> None:
         self.taken_over.append((old.design, new.design))
 

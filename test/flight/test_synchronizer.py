@@ -86,13 +86,13 @@ def test_a_new_run_hears_nothing_of_the_one_before(
 
 def test_wires_hand_on_in_the_order_of_speech_and_to_the_last_listener_first() -> None:
     bus, heard = IntraProcessBus(), list[tuple[str, int]]()
-    say = bus.speak("estimate")
-    bus.hear("estimate", lambda record: heard.append(("guidance", record)))
-    bus.hear("estimate", lambda record: heard.append(("controller", record)))
+    bus.advertise("estimate")
+    bus.subscribe("estimate", lambda record: heard.append(("guidance", record)))
+    bus.subscribe("estimate", lambda record: heard.append(("controller", record)))
     assert "estimate" in bus
     assert "target" not in bus
-    say(1)
-    say(2)
+    bus.publish("estimate", 1)
+    bus.publish("estimate", 2)
     assert heard == []
     bus.deliver()
     assert heard == [("controller", 1), ("guidance", 1), ("controller", 2), ("guidance", 2)]

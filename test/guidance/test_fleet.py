@@ -38,7 +38,9 @@ def fly(
 ) -> list[Target]:
     """One tick of all guidances."""
     seen = {name: estimate(state, seconds, mass) for name, state, mass in zip(guides, states, masses, strict=True)}
-    return [guide.on_tick(seen[name], *(seen[other] for other in guide.others))[0] for name, guide in guides.items()]
+    return [
+        guide.on_tick(seen[name], *(seen[other] for other in guide.neighbours))[0] for name, guide in guides.items()
+    ]
 
 
 def guides(**values: Any) -> dict[str, Guidance]:
@@ -63,7 +65,7 @@ def propagated(states: Array, seconds: float) -> Array:
 def test_the_others_come_with_the_target_in_the_order_of_the_fleet() -> None:
     states = on_the_ring(0.0)
     guide = Guidance("/deputy2/guidance", parameters(slot=1))
-    assert guide.others == ("deputy1", "deputy3", "deputy4")
+    assert guide.neighbours == ("deputy1", "deputy3", "deputy4")
     target, _ = guide.on_tick(estimate(states[1]), estimate(states[0]), None, estimate(states[3]))
     assert target.neighbours.tolist() == [states[0].tolist(), states[3].tolist()]
     broken, _ = guide.on_tick(

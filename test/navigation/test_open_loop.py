@@ -40,10 +40,9 @@ def recorded(path: Path, change_at: int = -1, **navigation: Any) -> Path:
         sink, run = InProcessRecorder(writer), Run(scenario)
         while not run.plant.finished:
             if run.plant.tick == change_at:
-                navigator = run.satellites[0].navigator
+                navigator = run.instances["/deputy1/navigation"].module
                 navigator.commit(navigator.stage({"filter": "ukf", "gate": 6.0}))
             run.tick(sink)
-        run.finish(sink)
     return path
 
 

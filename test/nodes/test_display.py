@@ -7,10 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 from visualization_msgs.msg import Marker
 
-from formation_gnc.nodes.display import markers, transforms
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import inertial_from_relative
 from formation_gnc.records import SatelliteTruth, Target, Truth
+from formation_gnc.transport.markers import markers, transforms
 from formation_gnc.types import NANOSECONDS
 
 TIME = 90 * NANOSECONDS + 500_000_000

@@ -20,16 +20,17 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
 from formation_gnc.errors import ConfigurationError
+from formation_gnc.flight.graph import MODULES
 from formation_gnc.recording import Bag
 from formation_gnc.sil.scenario import find_scenario
-from formation_gnc.transport.launcher import executable
+from formation_gnc.transport.processes import executable
 
 GNC_TOPICS = (
     "/clock",
     "/truth",
     *(f"/deputy1/{topic}" for topic in ("measurement", "estimate", "target", "thrust", "status")),
 )
-PARTS = ("navigation", "guidance", "controller")
+PARTS = tuple(MODULES)
 PATIENCE = 90.0  # s of wall time, for a machine that is busy with other things
 
 resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # what is aborted to hear where it was leaves nothing else

@@ -12,9 +12,10 @@ from formation_gnc.analysis.separation import minimum_separation
 from formation_gnc.cli import main
 from formation_gnc.recording.reader import Bag, identical
 from formation_gnc.records import Event, EventKind, Truth
+from formation_gnc.sil.plant_executive import Report
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import find_scenario, load_scenario
-from formation_gnc.transport.launcher import Report, fly_graph
+from formation_gnc.transport.launcher import LaunchOptions, fly_graph
 
 from .conftest import Sil, set_parameter
 
@@ -26,7 +27,7 @@ CHANGE = 8890
 def test_all_arrive_and_none_comes_near_another(scenario: str, tick: float) -> None:
     run = Run(load_scenario(scenario, {"/**": {"tick": tick}}))
     truths: list[Truth] = []
-    targets: dict[str, list[np.ndarray]] = {satellite.name: [] for satellite in run.satellites}
+    targets: dict[str, list[np.ndarray]] = {name: [] for name in run.plant.parameters.deputies}
     events: list[Event] = []
 
     def sink(topic: str, record: object) -> None:
@@ -53,7 +54,7 @@ def test_all_arrive_and_none_comes_near_another(scenario: str, tick: float) -> N
 
 def test_the_scenario_puts_four_on_four_places_with_one_change_each() -> None:
     scenario = load_scenario("tetrahedral")
-    guidances = [setup.guidance for setup in scenario.deputies.values()]
+    guidances = [setup["guidance"] for setup in scenario.deputies.values()]
     assert [guidance.slot for guidance in guidances] == [0, 1, 2, 3]
     assert all(len(guidance.schedule) == 1 for guidance in guidances)
 
@@ -121,7 +122,7 @@ def test_a_fleet_in_flight_is_told_of_another_formation_and_changes_at_one_tick(
             answers.append(set_parameter(domain, nodes[0], "schedule", ["{at: 0.0, formation: helix}"]))
             answers.append(set_parameter(domain, nodes[0], "formation", "helix"))
 
-    report = fly_graph(scenario, tmp_path / "bag", tell, hear, composed=True)
+    report = fly_graph(scenario, LaunchOptions(tmp_path / "bag", composed=True), tell, hear)
     assert [accepted for accepted, _ in answers] == [True] * 4 + [False] * 2
     assert "its time must be above" in answers[4][1]
     assert "by schedule only" in answers[5][1]

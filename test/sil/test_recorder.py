@@ -22,12 +22,13 @@ from rosbags.rosbag2 import Reader
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
+from formation_gnc.flight import topics
 from formation_gnc.recording import Bag
 from formation_gnc.recording.layout import LAYOUT
 from formation_gnc.recording.provenance import LOST
 from formation_gnc.recording.recover import PARTLY_LOST, recover
 from formation_gnc.records import EventKind
-from formation_gnc.transport import topics
+from formation_gnc.transport.qos import LATEST, quality
 from formation_gnc.types import NANOSECONDS
 
 from .conftest import GNC_TOPICS, PARTS, PATIENCE, Desk, Sil, Terminal, wait_until
@@ -79,18 +80,16 @@ def test_a_bag_says_all_of_its_run_and_nothing_of_the_machine(sil: Callable[...,
 
 
 def test_a_recorder_that_comes_late_knows_exactly_what_it_missed(desk: Desk) -> None:
-    ticks = 16 * topics.DEPTH  # at this pace it has 15 s to come in
+    ticks = 16 * topics.QUEUE_DEPTH  # at this pace it has 15 s to come in
     plant = desk.start("plant", duration=float(ticks), real_time_factor=500.0)
     parts = [desk.start(kind) for kind in PARTS]
     with user(desk) as (node, executor):
         heard: list[int] = []
-        node.create_subscription(
-            Clock, topics.CLOCK, lambda clock: heard.append(clock.clock.sec), topics.quality(topics.LATEST)
-        )
+        node.create_subscription(Clock, topics.CLOCK.name, lambda clock: heard.append(clock.clock.sec), quality(LATEST))
 
         def late() -> bool:
             executor.spin_once(timeout_sec=0.0)
-            return bool(heard) and heard[-1] > 1.2 * topics.DEPTH
+            return bool(heard) and heard[-1] > 1.2 * topics.QUEUE_DEPTH
 
         wait_until(late, "more ticks than writers keep")
     recorder = desk.start("recorder", bag=desk.directory / "bag", split_duration=500.0)
@@ -109,9 +108,7 @@ def test_a_recorder_that_comes_late_knows_exactly_what_it_missed(desk: Desk) -> 
 def test_a_recorder_reports_the_end_of_the_flight(desk: Desk) -> None:
     reported = []
     with user(desk) as (node, executor):
-        node.create_subscription(
-            Clock, topics.RECORDED, lambda clock: reported.append(clock.clock.sec), topics.quality()
-        )
+        node.create_subscription(Clock, topics.PROGRESS.name, lambda clock: reported.append(clock.clock.sec), quality())
         desk.start("recorder", bag=desk.directory / "bag")
         plant = desk.start("plant", duration=20.0, wait_for_recorder=True)
         for kind in PARTS:
@@ -128,8 +125,8 @@ def test_a_recorder_reports_the_end_of_the_flight(desk: Desk) -> None:
 def test_the_plant_stays_until_a_recorder_has_its_end(desk: Desk) -> None:
     with user(desk) as (node, executor):
         told: list[int] = []
-        node.create_subscription(Event, topics.EVENTS, lambda event: told.append(event.kind), topics.quality())
-        publisher = node.create_publisher(Clock, topics.RECORDED, topics.quality(topics.LATEST))
+        node.create_subscription(Event, topics.EVENTS.name, lambda event: told.append(event.kind), quality())
+        publisher = node.create_publisher(Clock, topics.PROGRESS.name, quality(LATEST))
 
         def record_up_to(stamp: int) -> None:
             progress = Clock()
@@ -160,22 +157,23 @@ import rclpy
 from formation_gnc_msgs import msg
 from rosgraph_msgs.msg import Clock
 
+from formation_gnc.flight import topics
 from formation_gnc.nodes.recorder import RecorderNode
 from formation_gnc.records import EventKind
-from formation_gnc.transport import topics
+from formation_gnc.transport.qos import quality
 
 rclpy.init(args=sys.argv)
 recorder, user = RecorderNode(), rclpy.create_node("user")
 recorder._knows_the_run = lambda: True  # there is no plant to ask
 reported, publishers = [], {}
-recorder.create_subscription(Clock, topics.RECORDED, lambda clock: reported.append(clock.clock.sec), 10)
+recorder.create_subscription(Clock, topics.PROGRESS.name, lambda clock: reported.append(clock.clock.sec), 10)
 
 
 def tell(message_type, topic, stamp, **fields):
     message = message_type(**fields)
     (message.clock if message_type is Clock else message.header.stamp).sec = stamp
     if topic not in publishers:
-        publishers[topic] = user.create_publisher(message_type, topic, topics.quality())
+        publishers[topic] = user.create_publisher(message_type, topic, quality())
     publishers[topic].publish(message)
 
 
@@ -251,18 +249,20 @@ import time
 import rclpy
 from formation_gnc_msgs.msg import Event
 
-from formation_gnc.transport import node as shell, topics
+from formation_gnc.flight import topics
+from formation_gnc.transport import process
+from formation_gnc.transport.qos import quality
 from formation_gnc.nodes.recorder import QUIET, RecorderNode, record
 from formation_gnc.records import EventKind
 
 rclpy.init(args=sys.argv)
 recorder, user = RecorderNode(), rclpy.create_node("user")
-publisher = user.create_publisher(Event, topics.EVENTS, topics.quality())
+publisher = user.create_publisher(Event, topics.EVENTS.name, quality())
 recorder.spin(lambda: publisher.get_subscription_count() > 0)
 for _ in range(50):
     publisher.publish(Event())
 time.sleep(2.0 * QUIET)
-shell._stop_signals.append(signal.SIGINT)
+process._stop_signals.append(signal.SIGINT)
 record(recorder)
 """
 
@@ -270,7 +270,7 @@ record(recorder)
 def test_a_recorder_that_got_no_processor_hears_what_is_waiting_before_it_stops(desk: Desk) -> None:
     bag = desk.directory / "bag"
     run_in_process_of_its_own(IDLER, desk, bag)
-    assert Bag(bag).topics[topics.EVENTS].count == 50
+    assert Bag(bag).topics[topics.EVENTS.name].count == 50
 
 
 def test_a_snapshot_has_the_last_stretch_before_the_call(desk: Desk) -> None:
@@ -334,7 +334,7 @@ def test_a_kill_at_any_moment_loses_at_most_half_a_second(
             nonlocal flown
             flown = clock.clock.sec
 
-        node.create_subscription(Clock, topics.CLOCK, hear, topics.quality(topics.LATEST))
+        node.create_subscription(Clock, topics.CLOCK.name, hear, quality(LATEST))
 
         def flies() -> bool:
             executor.spin_once(timeout_sec=0.0)
@@ -359,12 +359,12 @@ def test_a_kill_at_any_moment_loses_at_most_half_a_second(
     clocks, decoded = [], []
     with Reader(result.output) as reader:
         for connection, stamp, _ in reader.messages():
-            if connection.topic == topics.CLOCK:
+            if connection.topic == topics.CLOCK.name:
                 clocks.append(stamp // NANOSECONDS)
     with (result.output / "saved_0.mcap").open("rb") as stream:
         by_another = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
         for _, channel, _, message in by_another.iter_decoded_messages(log_time_order=False):
-            if channel.topic == topics.CLOCK:
+            if channel.topic == topics.CLOCK.name:
                 decoded.append(message.clock.sec)
     assert clocks == decoded == list(range(len(clocks))), "no tick is missing before the last"
     lacks = (at_kill - max(clocks, default=0)) / PACE

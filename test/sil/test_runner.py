@@ -263,12 +263,12 @@ def test_a_deputy_without_an_estimate_misses_its_ticks_and_comes_back_with_a_fix
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     run, records = Run(load_scenario("leader_follower")), Records()
-    think = run.satellites[0].navigator.on_tick
+    think = run.instances["/deputy1/navigation"].module.on_tick
 
     def lost(measurement: Any) -> Any:
         return None if 10 <= run.plant.tick < 13 else think(measurement)
 
-    monkeypatch.setattr(run.satellites[0].navigator, "on_tick", lost)
+    monkeypatch.setattr(run.instances["/deputy1/navigation"].module, "on_tick", lost)
     for _ in range(20):
         run.tick(lambda topic, record: records.setdefault(topic, []).append(record))
     assert run.misses == 3
@@ -297,7 +297,7 @@ def test_a_satellite_without_an_estimate_costs_its_fleet_a_tick_as_on_the_graph(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     run = Run(load_scenario("tetrahedral"))
-    silent = run.satellites[1].navigator
+    silent = run.instances["/deputy2/navigation"].module
     answer = silent.on_tick
     monkeypatch.setattr(silent, "on_tick", lambda seen: None if run.plant.tick == 3 else answer(seen))
     records: dict[str, list[Any]] = {}

@@ -160,13 +160,13 @@ def test_namespaces_may_be_nested_and_parameters_too(write: Write) -> None:
     assert scenario.name == "scenario"
     assert scenario.plant.deputy["deputy1"].mass == 7.0
     assert scenario.plant.chief.inclination == 0.5
-    assert (scenario.plant.tick, scenario.deputies["deputy1"].guidance.tick) == (1.0, 3.0)
-    assert scenario.deputies["deputy1"].navigation.radius_sigma == 2.0
+    assert (scenario.plant.tick, scenario.deputies["deputy1"]["guidance"].tick) == (1.0, 3.0)
+    assert scenario.deputies["deputy1"]["navigation"].radius_sigma == 2.0
 
 
 def test_overrides_go_before_the_file() -> None:
     scenario = load_scenario("leader_follower", {"/plant": {"seed": 9}, "/**/controller": {"algorithm": "coast"}})
-    assert (scenario.plant.seed, scenario.deputies["deputy1"].controller.algorithm) == (9, "coast")
+    assert (scenario.plant.seed, scenario.deputies["deputy1"]["controller"].algorithm) == (9, "coast")
 
 
 def test_a_scenario_is_found_by_its_name_or_by_its_path() -> None:

@@ -1,0 +1,13 @@
+"""The executable of every flight module: its name says which row of the graph table it runs."""
+
+import sys
+from pathlib import Path
+
+from formation_gnc.flight.graph import MODULES
+from formation_gnc.transport.module_node import ModuleNode
+from formation_gnc.transport.process import run
+
+
+def main() -> int:
+    """Run the module of the executable's name."""
+    return run(lambda: ModuleNode(MODULES[Path(sys.argv[0]).name]))

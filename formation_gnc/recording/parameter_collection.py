@@ -1,0 +1,68 @@
+"""Whose parameters a recording still lacks, and when to ask for them."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from formation_gnc.flight.graph import GRAPH
+from formation_gnc.recording.provenance import parameters_record
+
+ASK_AGAIN = 2.0
+"""Wall time (s) after which a node is asked again: ROS drops an answer to a client that it has not discovered yet,
+which happens when many nodes start on a busy machine."""
+
+PLANT = "/plant"
+
+
+@dataclass
+class ParameterCollection:
+    """Parameters of all nodes of a run: each asked for when it appears, and again when it was started again."""
+
+    values: dict[str, Mapping[str, Any]] = field(default_factory=dict)
+    """Latest parameters by full node name."""
+
+    def __post_init__(self) -> None:
+        """Nobody is known."""
+        self._known: set[str] = set()
+        self._wanted: dict[str, str] = {}
+        self._asked: dict[str, float] = {}
+
+    def appeared(self, nodes: Collection[str]) -> list[str]:
+        """Note the nodes that are there; returns those seen for the first time."""
+        new = [node for node in nodes if node not in self._known]
+        self._known.update(new)
+        self._wanted |= {node: parameters_record(node) for node in new}
+        return new
+
+    def restarted(self, node: str, stamp: int) -> None:
+        """Ask a node again that was started again and answered a stamp (ns) first."""
+        if node in self._known:
+            self._wanted[node] = parameters_record(node, stamp)
+            self._asked.pop(node, None)
+
+    def due(self, now: float) -> dict[str, str]:
+        """Nodes to be asked at a time (s), with the names of the records for their answers."""
+        return {
+            node: record
+            for node, record in self._wanted.items()
+            if now - self._asked.get(node, -ASK_AGAIN) >= ASK_AGAIN
+        }
+
+    def asked(self, node: str, now: float) -> None:
+        """Note that a node was asked at a time (s)."""
+        self._asked[node] = now
+
+    def received(self, node: str, record: str, values: Mapping[str, Any]) -> bool:
+        """Take an answer; returns whether it is to go on record: not one to a question that is out of date."""
+        if self._wanted.get(node) != record:
+            return False
+        del self._wanted[node]
+        self.values[node] = values
+        return True
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the parameters of the plant and of every deputy's modules are known."""
+        deputies = self.values.get(PLANT, {}).get("deputies", ())
+        nodes = [f"/{deputy}/{row.name}" for deputy in deputies for row in GRAPH]
+        return bool(nodes) and all(self.values.get(node) for node in nodes)

@@ -1,0 +1,160 @@
+"""One recording: every message into a bag, with what is lost, how far it is, and with which parameters it flew."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from formation_gnc.flight import topics
+from formation_gnc.flight.graph import MODULES
+from formation_gnc.parameters import to_json
+from formation_gnc.recording.layout import LAYOUT, foxglove_layout
+from formation_gnc.recording.loss import LossCounter
+from formation_gnc.recording.parameter_collection import PLANT, ParameterCollection
+from formation_gnc.recording.progress import NONE, RecordingProgress
+from formation_gnc.recording.provenance import LOST, parameters_record
+from formation_gnc.recording.snapshot import Snapshot
+from formation_gnc.recording.writer import BagWriter
+from formation_gnc.records import Event, EventKind
+
+REPORT_TICKS = 64
+"""Ticks after which progress is reported at the latest."""
+
+
+class RecordingSession:
+    """Takes what comes on every topic and writes it to a bag.
+
+    failure: why the disk took no more; from then on nothing is recorded.
+    """
+
+    def __init__(
+        self,
+        bag: BagWriter,
+        scenario: str,
+        report: Callable[[int], None],
+        decode_event: Callable[[bytes], Event],
+        snapshot: float = 0.0,
+    ) -> None:
+        """Record to a bag.
+
+        Args:
+            bag: closed by `close`.
+            scenario: its name, for the bag's metadata.
+            report: takes the stamp (ns) up to which everything is recorded, whenever it has changed.
+            decode_event: the event that a message on `/events` carries.
+            snapshot: s of simulated time to keep in memory until `write_snapshot`; 0 to write everything at once.
+        """
+        self.bag, self._scenario, self._decode_event = bag, scenario, decode_event
+        self.failure: OSError | None = None
+        self.parameters = ParameterCollection()
+        self.progress = RecordingProgress()
+        self._report, self._reported = report, NONE - 1
+        self._snapshot = Snapshot(bag, snapshot) if snapshot else None
+        self._write = self._snapshot.write if self._snapshot else bag.write
+        self._losses: dict[str, LossCounter] = {}
+        self._lost = 0
+        self._received = True
+
+    def open_topic(
+        self, topic: str, type_name: str, publishers: Callable[[], int], latched: bool
+    ) -> Callable[[bytes, int, int | None], None]:
+        """Add a topic to the bag.
+
+        Args:
+            topic: full name.
+            type_name: of its messages.
+            publishers: how many there are just now.
+            latched: whether late subscribers get what was published before.
+
+        Returns:
+            What takes its messages: CDR bytes, stamp in ns, and the publisher's sequence number if there is one.
+        """
+        self.bag.add_topic(topic, type_name, topics.QUEUE_DEPTH)
+        loss = self._losses[topic] = LossCounter(publishers, latched)
+        node = _answering(topic)
+        is_clock, is_events = topic == topics.CLOCK.name, topic == topics.EVENTS.name
+        concerns_progress = self.progress.concerns(topic)
+        count = 0
+
+        def take(data: bytes, stamp: int, number: int | None) -> None:
+            nonlocal count
+            self._received = True
+            count += 1
+            if number is not None:
+                loss.take(number)
+            if node and number == 1 and count > 1:
+                self.parameters.restarted(node, stamp)
+            self._write(topic, data, stamp, number or count)
+            if concerns_progress:
+                self.progress.take(topic, stamp)
+            elif is_events:
+                event = self._decode_event(data)
+                self.progress.take_event(event.time, event.subject if event.kind == EventKind.MISS else "")
+            if is_clock and count % REPORT_TICKS == 0:
+                self.report_progress()
+
+        return self.while_disk_lasts(take)
+
+    def report_progress(self) -> None:
+        """Report how far the recording is, if that has changed."""
+        stamp = self.progress.stamp
+        if stamp != self._reported:
+            self._reported = stamp
+            self._report(stamp)
+
+    def put_on_record(self, node: str, record: str, values: Mapping[str, Any], left_out: tuple[str, ...] = ()) -> None:
+        """Write a node's parameters at once, so that a bag that is cut short can be replayed."""
+        if not self.parameters.received(node, record, values):
+            return
+        recorded = {name: to_json(value) for name, value in values.items() if name not in left_out}
+        self.bag.add_metadata(record, recorded)
+        if record == parameters_record(PLANT):
+            self.bag.add_metadata("run", {"scenario": self._scenario, "seed": str(values.get("seed", ""))})
+            self.bag.add_attachment(LAYOUT, foxglove_layout(values.get("deputies", ())).encode())
+
+    def write_snapshot(self) -> tuple[bool, str]:
+        """Write the stretch of simulated time kept in memory; returns whether that succeeded, and how in words."""
+        written: list[str] = []
+
+        def write() -> None:
+            assert self._snapshot is not None, "only a recording with a snapshot is triggered"
+            written.append(f"{self._snapshot.trigger()} messages written to {self.bag.directory}")
+
+        self.while_disk_lasts(write)()
+        return bool(written), written[0] if written else str(self.failure)
+
+    def new_losses(self) -> dict[str, int]:
+        """Messages lost so far by topic, if there are more than when last asked; else empty."""
+        lost = {topic: each.lost for topic, each in self._losses.items() if each.lost}
+        total = sum(lost.values())
+        if total <= self._lost:
+            return {}
+        self._lost = total
+        return lost
+
+    def is_quiet(self) -> bool:
+        """Whether nothing has come since this was last asked; not before it is asked twice."""
+        quiet, self._received = not self._received, False
+        return quiet
+
+    def while_disk_lasts[**P](self, work: Callable[P, None]) -> Callable[P, None]:
+        """`work` until the disk fails, which an executor would not let through."""
+
+        def guarded(*arguments: P.args, **keywords: P.kwargs) -> None:
+            if self.failure is None:
+                try:
+                    work(*arguments, **keywords)
+                except OSError as failure:
+                    self.failure = failure
+
+        return guarded
+
+    def close(self) -> None:
+        """Finish the bag."""
+        if self.failure is None:
+            self.bag.add_metadata(LOST, {topic: str(each.lost) for topic, each in self._losses.items()})
+            self.bag.close()
+
+
+def _answering(topic: str) -> str:
+    """Full name of the module that answers on a topic; empty for none."""
+    deputy, name = topics.deputy_of(topic), topic.rpartition("/")[2]
+    return next((f"/{deputy}/{row.name}" for row in MODULES.values() if deputy and row.answer.name == name), "")

@@ -1,0 +1,150 @@
+"""Runs the plant on the node graph: start, deadlines, pace, a recorder that lags, reports, the end."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from formation_gnc.flight.barrier import Decision
+from formation_gnc.plant.plant import PlantParameters
+from formation_gnc.records import Thrust
+from formation_gnc.sil.simulation import Simulation, Sink
+
+CHECK_PERIOD = 0.05
+"""Wall time (s) between checks of deadlines, of the recorder and of who is there."""
+
+REPORT_PERIOD = 0.5
+"""Wall time (s) between reports."""
+
+RECORDER = "/recorder"
+
+
+@dataclass(frozen=True)
+class Report:
+    """Where the run is: a word, and figures by name."""
+
+    message: str
+    figures: Mapping[str, float]
+
+
+class Surroundings(Protocol):
+    """What the executive sees of the graph, and how it makes itself heard."""
+
+    def is_published(self, topic: str) -> bool:
+        """Whether anybody publishes a topic."""
+
+    def has_recorder(self) -> bool:
+        """Whether a recorder reports progress."""
+
+    def recorder_listens(self) -> bool:
+        """Whether a recorder has subscribed to every topic of the run, and knows all parameters."""
+
+    def publish(self, topic: str, record: Any) -> None:
+        """Publish a record."""
+
+    def log(self, text: str) -> None:
+        """Say something for people."""
+
+    def report(self, report: Report) -> None:
+        """Publish where the run is."""
+
+
+class PlantExecutive:
+    """Starts a run when everybody is there, and takes it to its end.
+
+    The run starts when every deputy's modules are there, and the recorder if it is to be waited for; from then
+    on the tick barrier decides. Times `now` are seconds of a monotonic wall clock.
+    """
+
+    def __init__(self, parameters: PlantParameters, surroundings: Surroundings) -> None:
+        """Build the plant; raises ConfigurationError for what cannot be flown."""
+        self._parameters, self._around = parameters, surroundings
+        self.simulation = Simulation(parameters, parameters.deadline)
+        self._publish: Sink = surroundings.publish
+        self._began = self._reported = 0.0
+        self._said = ""
+
+    @property
+    def finished(self) -> bool:
+        """Whether all ticks are flown."""
+        return self.simulation.plant.finished
+
+    def check(self, now: float) -> bool:
+        """Do what no message triggers; called every `period`. Returns whether all ticks are flown."""
+        barrier = self.simulation.barrier
+        if not self.simulation.has_begun:
+            self._begin_if_all_are_there(now)
+        elif not self.finished:
+            barrier.has_recorder = self._around.has_recorder()
+            barrier.check(now)
+            self._say_what_is_awaited(barrier.decide(now))
+            self.advance_if_ready(now)
+            if now - self._reported > REPORT_PERIOD and not self.finished:
+                self._report("flying", now)
+        return self.finished
+
+    def answer(self, deputy: str, thrust: Thrust, now: float) -> None:
+        """Take a thrust command."""
+        if self.simulation.answer(deputy, thrust):
+            self.advance_if_ready(now)
+
+    def recorded(self, stamp: int, now: float) -> None:
+        """Take the recorder's word that it has everything up to a stamp (ns)."""
+        self.simulation.barrier.recorded = stamp
+        if self.simulation.has_begun:
+            self.advance_if_ready(now)
+
+    def advance_if_ready(self, now: float) -> None:
+        """Fly the tick if the barrier says that it is over."""
+        if self.finished:
+            return
+        decision = self.simulation.advance_if_ready(now, self._publish, self._absent)
+        if decision.advance and self.finished:
+            self._report("finished", now)
+
+    def period(self, now: float) -> float:
+        """Wall time (s) until the next check."""
+        pause = self.simulation.barrier.decide(now).pause if self.simulation.has_begun else 0.0
+        return min(CHECK_PERIOD, pause) if pause > 0.0 else CHECK_PERIOD
+
+    def recorder_is_done(self) -> bool:
+        """Whether the recorder, if there is one, has everything to the end."""
+        barrier = self.simulation.barrier
+        barrier.has_recorder = self._around.has_recorder()
+        return barrier.recorder_is_done(self.simulation.plant.time)
+
+    def _begin_if_all_are_there(self, now: float) -> None:
+        missing = ", ".join(self._missing())
+        self._say(f"waiting for {missing}" if missing else "flying")
+        if missing:
+            self._report(self._said, now)
+        else:
+            self._began = now
+            self.simulation.open_tick(now, self._publish)
+
+    def _absent(self) -> list[str]:
+        return list(self.simulation.unattended(self._around.is_published))
+
+    def _missing(self) -> Iterator[str]:
+        yield from self._absent()
+        if self._parameters.wait_for_recorder and not (
+            self.simulation.barrier.recorded is not None and self._around.recorder_listens()
+        ):
+            yield RECORDER
+
+    def _say_what_is_awaited(self, decision: Decision) -> None:
+        if not decision.overdue:
+            return
+        if RECORDER in decision.waiting_for:
+            self._say(f"waiting for {RECORDER}, which lags behind")
+        elif decision.waiting_for:
+            self._say(f"waiting for the first answer of {', '.join(decision.waiting_for)}")
+
+    def _say(self, text: str) -> None:
+        if text != self._said:
+            self._around.log(text)
+            self._said = text
+
+    def _report(self, message: str, now: float) -> None:
+        self._reported = now
+        elapsed = now - self._began if self.simulation.has_begun else 0.0
+        self._around.report(Report(message, self.simulation.figures(elapsed)))

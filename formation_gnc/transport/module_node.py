@@ -1,0 +1,128 @@
+"""The node of a flight module, whichever: its place in the graph is read from the graph table."""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from time import perf_counter
+from typing import Any
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.parameter import Parameter
+from rclpy.service import Service
+from rclpy.timer import Timer
+
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.flight import topics
+from formation_gnc.flight.graph import ModuleInstance, Row
+from formation_gnc.parameters import OWN_OF_ROS
+from formation_gnc.records import Event, Timing
+from formation_gnc.transport.bus import IntraProcessBus
+from formation_gnc.transport.conversion import codec
+from formation_gnc.transport.node import ConfiguredNode
+from formation_gnc.types import NANOSECONDS
+
+SETTLING = 0.1
+"""Wall time (s) that a node which has just started collects, from the first message on, before it answers."""
+
+
+class ModuleNode(ConfiguredNode):
+    """Shell of a flight module of one deputy: messages to records, one call, records to messages.
+
+    A change of parameters through the standard services is checked and designed in a thread of its own, so
+    that no answer waits for it, and takes effect at the next tick; it is answered when that is settled, with
+    the reason if it is rejected.
+
+    A node that comes late finds the topics' history, and answers its last tick only: an answer to an older one
+    would look like a new run to those who have gone on.
+    """
+
+    def __init__(self, row: Row, bus: IntraProcessBus | None = None) -> None:
+        """Build the module from the node's parameters; the namespace is deputy1 unless it is remapped.
+
+        row: of the graph table. bus: joins the modules of one process.
+        """
+        super().__init__(row.name, row.parameters, namespace="deputy1")
+        self._bus = bus or IntraProcessBus()
+        self._instance = ModuleInstance(row, self.get_namespace().strip("/"), self.values)
+        self._module = self._instance.module
+        self._publish = {
+            topic.of(self._instance.deputy): self._published(topic) for topic in self._instance.published()
+        }
+        self._publish_event = self.publisher_of(Event, topics.EVENTS.name)
+        self._publish_timing = self.publisher_of(Timing, topics.TIMING.name)
+        self._latest: dict[str, Callable[[], None]] = {}
+        self._settled = next(iter(self._instance.inputs)) in self._bus
+        for topic, record in {**self._instance.inputs, **self._instance.inputs_of_others}.items():
+            self._subscribe_input(topic, record)
+        self._designer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="design")
+        self.add_on_set_parameters_callback(self._on_set_parameters)
+        for service in self.services:
+            if service.srv_name.endswith(("/set_parameters", "/set_parameters_atomically")):
+                _answer_from(self._designer, service)
+
+    def _published(self, topic: topics.Topic) -> Callable[[Any], None]:
+        name = topic.of(self._instance.deputy)
+        publish, bus = self.publisher_of(topic.record, name), self._bus
+        bus.advertise(name)
+
+        def publish_on_both(record: Any) -> None:
+            publish(record)
+            bus.publish(name, record)
+
+        return publish_on_both
+
+    def _subscribe_input(self, topic: str, record: type) -> None:
+        if topic in self._bus:
+            self._bus.subscribe(topic, partial(self._take, topic))
+        else:
+            self.subscribe(record, topic, partial(self._receive, topic, codec(record).decode))
+
+    def _receive(self, topic: str, decode: Callable[[bytes], Any], data: bytes) -> None:
+        if self._settled:
+            self._take(topic, decode(data))
+            return
+        if not self._latest:
+            timer = self.create_wall_timer(SETTLING, lambda: self._settle(timer))
+        self._latest[topic] = partial(self._take, topic, decode(data))
+
+    def _settle(self, timer: Timer) -> None:
+        timer.cancel()
+        self._settled = True
+        for take in self._latest.values():
+            take()
+
+    def _take(self, topic: str, record: Any) -> None:
+        """Answer the tick when the last input of its stamp is there; the outputs go first, others wait for them."""
+        started = perf_counter()
+        inputs = self._instance.synchronizer.take(topic, record)
+        if inputs is None:
+            return
+        for name, output in self._instance.respond(inputs):
+            self._publish[name](output)
+        spent = perf_counter() - started
+        self._bus.deliver()
+        self._publish_timing(Timing(inputs[0].time, self._instance.row.name, round(spent * NANOSECONDS)))
+        for event in self._instance.take_events():
+            self.get_logger().info(str(event))
+            self._publish_event(event)
+
+    def _on_set_parameters(self, parameters: Sequence[Parameter]) -> SetParametersResult:
+        changes = {each.name: each.value for each in parameters if not each.name.startswith(OWN_OF_ROS)}
+        if changes:
+            try:
+                self._module.commit(self._module.stage(changes))
+            except ConfigurationError as rejection:
+                return SetParametersResult(successful=False, reason=str(rejection))
+        return SetParametersResult(successful=True)
+
+    def destroy_node(self) -> None:
+        """Let no design outlive the node."""
+        self._designer.shutdown(wait=False, cancel_futures=True)
+        super().destroy_node()
+
+
+def _answer_from(pool: ThreadPoolExecutor, service: Service) -> None:
+    """Let a thread of `pool` work out a service's responses and send each when it is there."""
+    handle, send = service.callback, service.send_response
+    service.callback = lambda request, response: pool.submit(handle, request, response)
+    service.send_response = lambda answer, header: answer.add_done_callback(lambda done: send(done.result(), header))

@@ -1,0 +1,111 @@
+"""Processes of a run's node graph: started as `ros2 run` would, watched, and stopped, all of them."""
+
+import ctypes
+import os
+import signal
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+from time import monotonic, sleep
+
+from formation_gnc.errors import ConfigurationError
+
+PR_SET_PDEATHSIG = 1  # from <linux/prctl.h>
+GRACE = 2.0
+"""Wall time (s) that nodes have to stop when asked; those left then are killed."""
+
+TIME_TO_CLOSE = 10.0
+"""Wall time (s) that the recorder has to close its bag, which takes long on a busy machine."""
+
+
+class NodeDied(RuntimeError):
+    """A node ended before the run; the message says which and why."""
+
+
+@dataclass
+class NodeProcess:
+    """A running node."""
+
+    name: str
+    process: subprocess.Popen[bytes]
+    log: Path
+
+    def reason(self) -> str:
+        """Why it ended, in words, with the last line of its log."""
+        code = self.process.returncode
+        how = f"killed by {signal.Signals(-code).name}" if code < 0 else f"exit status {code}"
+        lines = self.log.read_text(errors="replace").strip().splitlines()
+        return how + (f": {lines[-1]}" if lines else "")
+
+
+def executable(node: str) -> Path:
+    """Path of a node's executable, where `ros2 run formation_gnc` finds it."""
+    for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep):
+        path = Path(prefix) / "lib" / "formation_gnc" / node
+        if path.is_file():
+            return path
+    raise ConfigurationError(f"node {node}: not installed; build with colcon, and source env.sh or install/setup.bash")
+
+
+class Graph:
+    """All processes of a run, in a ROS domain of their own."""
+
+    def __init__(self, domain: int, directory: Path) -> None:
+        """Start nothing yet; logs go to `directory`."""
+        self.nodes: list[NodeProcess] = []
+        self._environment = os.environ | {
+            "ROS_DOMAIN_ID": str(domain),
+            "ROS_AUTOMATIC_DISCOVERY_RANGE": os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"),
+        }
+        self._directory = directory
+
+    def start(self, name: str, arguments: list[str]) -> NodeProcess:
+        """Start the node of this full name, such as ``/deputy1/controller``, in a session of its own."""
+        namespace, _, kind = name.rpartition("/")
+        remap = ["-r", f"__ns:={namespace}"] if namespace else []
+        log = self._directory / f"{name.strip('/').replace('/', '.')}.log"
+        with log.open("wb") as stream:
+            process = subprocess.Popen(
+                [executable(kind), "--ros-args", *remap, *arguments],
+                stdin=subprocess.DEVNULL,
+                stdout=stream,
+                stderr=subprocess.STDOUT,
+                env=self._environment,
+                start_new_session=True,
+                preexec_fn=_end_with_parent,  # before any thread is there that could hold a lock
+            )
+        node = NodeProcess(name, process, log)
+        self.nodes.append(node)
+        return node
+
+    def check(self) -> None:
+        """Raise NodeDied if a node has ended with an error."""
+        for node in self.nodes:
+            if node.process.poll() not in (None, 0):
+                raise NodeDied(f"{node.name} ended: {node.reason()}")
+
+    def stop(self) -> None:
+        """Stop every node, the recorder last, since it hears the others out; by force what does not stop."""
+        for kind in (False, True):
+            group = [node for node in self.nodes if node.name.endswith("/recorder") is kind]
+            _signal(group, signal.SIGINT)
+            _wait(group, GRACE / 2 if not kind else TIME_TO_CLOSE)
+            _signal(group, signal.SIGKILL)
+        _wait(self.nodes, GRACE)
+
+
+def _end_with_parent() -> None:
+    """Let the kernel send SIGTERM to this process when the one that started it is gone, however it went."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+
+
+def _signal(nodes: list[NodeProcess], number: signal.Signals) -> None:
+    for node in nodes:
+        if node.process.poll() is None:
+            os.killpg(node.process.pid, number)
+
+
+def _wait(nodes: list[NodeProcess], seconds: float) -> None:
+    end = monotonic() + seconds
+    while monotonic() < end and any(node.process.poll() is None for node in nodes):
+        sleep(0.02)

@@ -1,0 +1,81 @@
+"""How far a recording is, whatever the order in which topics come."""
+
+from itertools import permutations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from formation_gnc.flight import topics
+from formation_gnc.recording.progress import RecordingProgress
+
+PLANT = (topics.CLOCK.name, topics.TRUTH.name)
+DEPUTIES = ("deputy1", "deputy2")
+MEASUREMENTS = tuple(topics.MEASUREMENT.of(name) for name in DEPUTIES)
+ANSWERS = tuple(topic.of(name) for name in DEPUTIES for topic in (topics.ESTIMATE, topics.TARGET, topics.THRUST))
+TICK = (*PLANT, *MEASUREMENTS, *ANSWERS)
+
+
+def recorded(*ticks: int) -> RecordingProgress:
+    """Everything of these ticks has come."""
+    progress = RecordingProgress()
+    for tick in ticks:
+        for topic in TICK:
+            progress.take(topic, tick)
+    return progress
+
+
+def test_a_tick_is_recorded_when_its_last_message_has_come() -> None:
+    for last in TICK:
+        progress = recorded(0)
+        for topic in TICK:
+            if topic != last:
+                progress.take(topic, 1)
+        assert progress.stamp == 0, last
+        progress.take(last, 1)
+        assert progress.stamp == 1
+
+
+def test_a_miss_counts_instead_of_the_answers() -> None:
+    progress = recorded(0)
+    for topic in (*PLANT, *MEASUREMENTS, *(each for each in ANSWERS if "deputy1" in each)):
+        progress.take(topic, 1)
+    assert progress.stamp == 0
+    progress.take_event(1, missed_by="deputy2")
+    assert progress.stamp == 1
+
+
+def test_the_end_of_the_run_counts_when_all_else_has_come() -> None:
+    progress = recorded(0, 1)
+    progress.take_event(2)
+    assert progress.stamp == 2
+    behind = recorded(0)
+    behind.take(topics.CLOCK.name, 1)
+    behind.take_event(2)
+    assert behind.stamp == 0
+
+
+def test_a_plant_started_again_starts_progress_again() -> None:
+    progress = recorded(0, 1, 2)
+    progress.take(topics.CLOCK.name, 0)
+    for order in permutations((topics.TRUTH.name, *MEASUREMENTS)):
+        for topic in order:
+            progress.take(topic, 0)
+    assert progress.stamp == -1, "the answers of the run before do not count"
+    for topic in ANSWERS:
+        progress.take(topic, 0)
+    assert progress.stamp == 0
+
+
+@given(st.permutations([(topic, tick) for topic in TICK for tick in range(4)]))
+def test_progress_never_runs_ahead_of_a_topic(arrivals: list[tuple[str, int]]) -> None:
+    """Topics keep their own order; between topics any order is possible."""
+    streams: dict[str, list[int]] = {topic: [] for topic in TICK}
+    order = [topic for topic, _ in arrivals]
+    progress, before = RecordingProgress(), -1
+    for topic in order:
+        streams[topic].append(len(streams[topic]))
+        progress.take(topic, streams[topic][-1])
+        if all(streams[each] for each in TICK):  # all publishers are known
+            assert before <= progress.stamp <= min(ticks[-1] for ticks in streams.values())
+            before = progress.stamp
+    assert progress.stamp == 3

@@ -1,0 +1,175 @@
+"""The plant's side of a run without processes: who is awaited, what is said and published, the end."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from formation_gnc.flight import topics
+from formation_gnc.flight.graph import COMMAND, GRAPH
+from formation_gnc.records import EventKind, Thrust
+from formation_gnc.sil.plant_executive import PlantExecutive, Report
+from formation_gnc.sil.scenario import load_scenario
+from formation_gnc.sil.simulation import RECORDER_LAG
+
+TICKS = 10
+EVERYBODY = {row.answer.of("deputy1") for row in GRAPH}
+NODES = ", ".join(f"/deputy1/{row.name}" for row in GRAPH)
+
+
+class Graph:
+    """Surroundings of an executive: who is there, and what it published, said and reported."""
+
+    def __init__(self) -> None:
+        self.published = set[str]()
+        self.recorder = self.listens = False
+        self.messages: list[tuple[str, Any]] = []
+        self.said: list[str] = []
+        self.reports: list[Report] = []
+
+    def is_published(self, topic: str) -> bool:
+        return topic in self.published
+
+    def has_recorder(self) -> bool:
+        return self.recorder
+
+    def recorder_listens(self) -> bool:
+        return self.listens
+
+    def publish(self, topic: str, record: Any) -> None:
+        self.messages.append((topic, record))
+
+    def log(self, text: str) -> None:
+        self.said.append(text)
+
+    def report(self, report: Report) -> None:
+        self.reports.append(report)
+
+    def of(self, topic: str) -> Iterator[Any]:
+        return (record for name, record in self.messages if name == topic)
+
+    def events(self, kind: EventKind) -> list[Any]:
+        return [event for event in self.of(topics.EVENTS.name) if event.kind == kind]
+
+
+def start(graph: Graph, ticks: int = TICKS, **plant: Any) -> PlantExecutive:
+    """An executive on the default scenario that has looked around once."""
+    values = {"duration": float(ticks), "deadline": 2.0} | plant
+    executive = PlantExecutive(load_scenario("leader_follower", {"/plant": values}).plant, graph)
+    executive.check(0.0)
+    return executive
+
+
+def answer(executive: PlantExecutive, now: float, force: float = 0.0) -> None:
+    """deputy1 answers the tick in flight."""
+    stamp = executive.simulation.plant.time
+    executive.answer("deputy1", Thrust(stamp, np.full(3, force)), now)
+
+
+@pytest.fixture
+def graph() -> Graph:
+    return Graph()
+
+
+@pytest.fixture
+def complete(graph: Graph) -> Graph:
+    graph.published = set(EVERYBODY)
+    return graph
+
+
+def test_the_run_starts_when_every_answer_has_a_publisher(graph: Graph) -> None:
+    executive = start(graph)
+    assert graph.said == [f"waiting for {NODES}"]
+    graph.published = EVERYBODY - {COMMAND.of("deputy1")}
+    executive.check(0.1)
+    assert graph.said[-1] == "waiting for /deputy1/controller"
+    assert not graph.messages
+    graph.published = set(EVERYBODY)
+    executive.check(0.2)
+    assert graph.said[-1] == "flying"
+    names = [name for name, _ in graph.messages]
+    assert names == [topics.MEASUREMENT.of("deputy1"), topics.TRUTH.name, topics.CLOCK.name]
+
+
+def test_the_run_waits_for_a_recorder_that_knows_everything(complete: Graph) -> None:
+    executive = start(complete, wait_for_recorder=True)
+    assert complete.said == ["waiting for /recorder"]
+    complete.recorder = complete.listens = True
+    executive.check(0.1)
+    assert not complete.messages, "it has subscribed, but not said that it knows the parameters"
+    executive.recorded(-1, 0.2)
+    executive.check(0.3)
+    assert executive.simulation.has_begun
+
+
+def test_each_answer_flies_a_tick_and_the_last_ends_the_run(complete: Graph) -> None:
+    executive = start(complete)
+    for _ in range(TICKS):
+        answer(executive, 1.0)
+    assert executive.finished
+    assert executive.check(1.0)
+    assert [clock.time for clock in complete.of(topics.CLOCK.name)] == [tick * 10**9 for tick in range(TICKS)]
+    (end,) = complete.events(EventKind.END)
+    assert (end.tick, end.detail) == (TICKS, f"{TICKS} ticks flown, 0 missed")
+    assert complete.reports[-1].message == "finished"
+    assert complete.reports[-1].figures["speedup"] == pytest.approx(TICKS / 1.0)
+    answer(executive, 1.0)
+    assert len(complete.events(EventKind.END)) == 1, "what comes after the end changes nothing"
+
+
+def test_a_miss_is_told_with_its_reason_and_the_absent_node(complete: Graph) -> None:
+    executive = start(complete)
+    answer(executive, 0.0)
+    complete.published.discard(topics.ESTIMATE.of("deputy1"))
+    for now in np.arange(0.0, 2.2, 0.1):
+        executive.check(float(now))
+    (miss,) = complete.events(EventKind.MISS)
+    assert miss.subject == "deputy1"
+    assert miss.detail == "did not answer within 2 s (/deputy1/navigation not there): no thrust"
+    assert executive.simulation.misses == 1
+
+
+def test_a_force_that_is_not_finite_is_a_miss(complete: Graph) -> None:
+    executive = start(complete)
+    answer(executive, 0.0, np.nan)
+    (miss,) = complete.events(EventKind.MISS)
+    assert miss.detail == "commanded [nan, nan, nan] N: no thrust"
+
+
+def test_a_recorder_that_lags_holds_the_plant_and_is_named(complete: Graph) -> None:
+    complete.recorder = True
+    executive = start(complete, ticks=2 * RECORDER_LAG)
+    executive.recorded(0, 0.0)
+    executive.check(0.0)
+    for _ in range(2 * RECORDER_LAG):
+        answer(executive, 0.0)
+    assert executive.simulation.plant.tick == RECORDER_LAG + 1
+    for now in np.arange(0.0, 2.2, 0.1):
+        executive.check(float(now))
+    assert complete.said[-1] == "waiting for /recorder, which lags behind"
+    assert executive.simulation.misses == 0
+    executive.recorded(RECORDER_LAG * 10**9, 3.0)
+    assert executive.simulation.plant.tick == RECORDER_LAG + 2
+
+
+def test_the_plant_stays_until_the_recorder_has_its_end(complete: Graph) -> None:
+    executive = start(complete)
+    for _ in range(TICKS):
+        answer(executive, 0.0)
+    assert executive.recorder_is_done(), "without a recorder nobody waits"
+    complete.recorder = True
+    assert not executive.recorder_is_done()
+    executive.recorded((TICKS - 1) * 10**9, 0.0)
+    assert not executive.recorder_is_done(), "the last tick, but not the end"
+    executive.recorded(TICKS * 10**9, 0.0)
+    assert executive.recorder_is_done()
+
+
+def test_the_pace_decides_when_the_next_check_is(complete: Graph) -> None:
+    executive = start(complete, real_time_factor=100.0)
+    answer(executive, 0.001)
+    assert executive.simulation.plant.tick == 0, "a tick of 1 s takes 10 ms"
+    assert executive.period(0.001) == pytest.approx(0.009)
+    executive.check(0.0101)
+    assert executive.simulation.plant.tick == 1
