@@ -86,6 +86,21 @@ class EventKind(IntEnum):
     END = 16
 
 
+WARNINGS = frozenset(
+    {
+        EventKind.REJECTED,
+        EventKind.FALLBACK,
+        EventKind.LOST,
+        EventKind.DIVERGED,
+        EventKind.INFEASIBLE,
+        EventKind.SEPARATION,
+        EventKind.WARNING,
+        EventKind.MISS,
+        EventKind.THRUSTERS,
+    }
+)
+"""Kinds of events that somebody should look at."""
+
 Counts = NDArray[np.uint32]
 """A number for every `Rejection`."""
 

@@ -9,7 +9,7 @@ from rclpy._rclpy_pybind11 import NodeNameNonExistentError
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import COMMAND, every_tick
 from formation_gnc.plant.plant import PlantParameters
-from formation_gnc.records import Clock, Event, EventKind, Measurement, Thrust, Truth
+from formation_gnc.records import Clock, Event, Measurement, Thrust, Truth
 from formation_gnc.sil.plant_executive import RECORDER, PlantExecutive, Report
 from formation_gnc.transport.diagnostics import ReportPublisher
 from formation_gnc.transport.node import ConfiguredNode
@@ -43,8 +43,7 @@ class PlantNode(ConfiguredNode):
         """Publish a record; events are logged too."""
         self._publish[topic](record)
         if topic == topics.EVENTS.name:
-            log = self.get_logger().warning if record.kind == EventKind.MISS else self.get_logger().info
-            log(str(record))
+            self.log_event(record)
 
     def is_published(self, topic: str) -> bool:
         """Whether anybody publishes a topic."""

@@ -103,7 +103,7 @@ class ModuleNode(ConfiguredNode):
         self._bus.deliver()
         self._publish_timing(Timing(inputs[0].time, self._instance.row.name, round(spent * NANOSECONDS)))
         for event in self._instance.take_events():
-            self.get_logger().info(str(event))
+            self.log_event(event)
             self._publish_event(event)
 
     def _on_set_parameters(self, parameters: Sequence[Parameter]) -> SetParametersResult:

@@ -23,6 +23,7 @@ except ImportError:  # missing in other builds of Jazzy; slower, same behaviour
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight.topics import QUEUE_DEPTH
 from formation_gnc.parameters import OWN_OF_ROS, Leaf, dump, leaves, load, read_yaml
+from formation_gnc.records import WARNINGS, Event
 from formation_gnc.transport.conversion import codec, message_type
 from formation_gnc.transport.process import stop_requested
 from formation_gnc.transport.qos import LATEST, quality
@@ -83,6 +84,13 @@ class ConfiguredNode(Node):  # type: ignore[misc]
         """As `subscribe`, with the record."""
         decode: Callable[[bytes], Any] = codec(record).decode
         self.subscribe(record, topic, lambda data: callback(decode(data)))
+
+    def log_event(self, event: Event) -> None:
+        """Log an event at the level of its kind; rclpy allows one level per line of code."""
+        if event.kind in WARNINGS:
+            self.get_logger().warning(str(event))
+        else:
+            self.get_logger().info(str(event))
 
     def create_wall_timer(self, period: float, callback: Callable[[], None]) -> Timer:
         """A timer on wall time, whatever `use_sim_time` says: simulated time stands still while a node waits."""

@@ -176,7 +176,7 @@ def test_graph_and_in_process_runner_agree_bit_for_bit(sil: StartSil, tmp_path: 
         assert status == 0, errors
         bags.append(Bag(run.bag))
     assert identical(*bags, [*GNC_TOPICS, "/events"]) == []
-    assert [tick for tick, _ in events(bags[0].path, "parameters")] == [200, 300]
+    assert [tick for tick, _ in events(bags[0].path, EventKind.PARAMETERS)] == [200, 300]
     assert bags[0].topics["/truth"].count == 600
 
 
@@ -211,8 +211,8 @@ def test_every_nonlinear_law_flies_on_estimates_and_the_runner_agrees_bit_for_bi
         assert status == 0, errors
         bags.append(Bag(run.bag))
     assert identical(*bags, [*GNC_TOPICS, "/events"]) == []
-    assert events(bags[0].path, "miss") == []
-    assert events(bags[0].path, "fallback") == []
+    assert events(bags[0].path, EventKind.MISS) == []
+    assert events(bags[0].path, EventKind.FALLBACK) == []
     status_of = bags[0].arrays("/deputy1/status")
     assert list(status_of["algorithm"]) == [
         law for law, begin, end in zip(laws, begins, begins[1:], strict=False) for _ in range(begin, end)
