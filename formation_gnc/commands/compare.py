@@ -14,7 +14,7 @@ from rich.table import Table
 
 from formation_gnc.analysis.compare import draw_comparison, gnc_topics, run_figures
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.recording.reader import Bag, Difference, identical
+from formation_gnc.recording import Bag, Difference, identical
 
 SAME = "identical on every GNC topic"
 

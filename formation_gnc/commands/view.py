@@ -31,13 +31,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Serve until interrupted."""
     try:
-        from formation_gnc.recording.live import LiveView, Player
+        from formation_gnc.recording.live import LiveView
+        from formation_gnc.recording.live_player import LivePlayer
     except ImportError:
         raise ConfigurationError("foxglove-sdk is not installed: pip install foxglove-sdk") from None
     from formation_gnc.recording.reader import Bag
     from formation_gnc.transport.viewer import show_graph
 
-    player = Player(Bag(options.bag), options.port, options.layout, options.rate) if options.bag else None
+    player = LivePlayer(Bag(options.bag), options.port, options.layout, options.rate) if options.bag else None
     view = player.view if player else LiveView("formation_gnc", options.port, options.layout)
     stopped: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
