@@ -120,7 +120,7 @@ def installed_type(name: str) -> MessageType:
 
 
 def nanoseconds(arrays: Mapping[str, NDArray[Any]], field: str) -> NDArray[np.int64]:
-    """Times or durations of a field in what `MessageType.arrays` returns, ns."""
+    """Times or durations, ns, of a field of messages that were decoded to arrays."""
     times: NDArray[np.int64] = arrays[f"{field}.sec"].astype(np.int64) * NANOSECONDS + arrays[f"{field}.nanosec"]
     return times
 

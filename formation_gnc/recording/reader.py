@@ -20,6 +20,9 @@ from formation_gnc.recording.provenance import LOST
 if TYPE_CHECKING:
     import pandas as pd
 
+Arrays = dict[str, NDArray[Any]]
+"""Messages of a topic: an array per field, a row per message."""
+
 
 @dataclass(frozen=True)
 class Topic:
@@ -30,10 +33,10 @@ class Topic:
     count: int
 
 
-class Fields(dict[str, NDArray[Any]]):
-    """Arrays by field; raises BagError for a field that the messages lack."""
+class Fields(Arrays):
+    """Messages of a topic as arrays by field; raises BagError for a field that they lack."""
 
-    def __init__(self, source: str, arrays: dict[str, NDArray[Any]]) -> None:
+    def __init__(self, source: str, arrays: Arrays) -> None:
         """Hold the arrays of a source, which errors name."""
         super().__init__(arrays)
         self._source = source
@@ -41,6 +44,17 @@ class Fields(dict[str, NDArray[Any]]):
     def __missing__(self, field: str) -> NoReturn:
         """Raise BagError."""
         raise BagError(f"{self._source}: no message has a field {field}")
+
+    def integers(self, field: str) -> NDArray[np.int64]:
+        """Values of a field of integers.
+
+        Raises:
+            BagError: it has another type, as in a bag of another version of the messages.
+        """
+        column = self[field]
+        if column.dtype.kind not in "iu":
+            raise BagError(f"{self._source}: field {field} is not of integers")
+        return column.astype(np.int64)
 
 
 class Bag:
@@ -107,7 +121,7 @@ class Bag:
         for topic, data, stamp in self.messages(topics, start_ns, end_ns):
             yield topic, self.message_type(topic).message(data), stamp
 
-    def arrays(self, topic: str) -> dict[str, NDArray[Any]]:
+    def arrays(self, topic: str) -> Fields:
         """All messages of a topic: an array per field, a row per message in recorded order.
 
         "stamp_ns" is the stamp (int64, ns), "time" the same in s; then the fields of the message as in
@@ -115,7 +129,7 @@ class Bag:
         """
         return self._as_arrays(topic, [(data, stamp) for _, data, stamp in self.messages([topic])])
 
-    def batches(self, topics: Sequence[str], size: int = 1024) -> Iterator[tuple[str, dict[str, NDArray[Any]]]]:
+    def batches(self, topics: Sequence[str], size: int = 1024) -> Iterator[tuple[str, Fields]]:
         """Messages as (topic, `arrays` of `size` of them) in one pass, for bags of any length.
 
         Those of each topic come in recorded order.
@@ -131,7 +145,7 @@ class Bag:
             if rows:
                 yield topic, self._as_arrays(topic, rows)
 
-    def _as_arrays(self, topic: str, rows: list[tuple[bytes, int]]) -> dict[str, NDArray[Any]]:
+    def _as_arrays(self, topic: str, rows: list[tuple[bytes, int]]) -> Fields:
         stamps = np.array([stamp for _, stamp in rows], dtype=np.int64)
         fields = self.message_type(topic).arrays([data for data, _ in rows])
         return Fields(f"{self.path}: topic {topic}", {"stamp_ns": stamps, "time": stamps * 1e-9, **fields})
@@ -224,7 +238,7 @@ def read(path: str | Path) -> dict[str, "pd.DataFrame"]:
     return {topic: pd.DataFrame(columns(bag.arrays(topic))).set_index("time") for topic in bag.topics}
 
 
-def columns(arrays: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+def columns(arrays: Arrays) -> Arrays:
     """Stacked arrays as one column per element: "force" of shape (n, 3) as "force.0" to "force.2"."""
     flat = {}
     for field, array in arrays.items():
