@@ -1,7 +1,6 @@
 """A run that is read once and thinned equals the run read as a whole."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
