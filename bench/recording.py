@@ -14,7 +14,8 @@ from mcap_ros2.decoder import DecoderFactory
 
 from bench.result import Result, interleaved
 from formation_gnc.recording.reader import Bag
-from formation_gnc.recording.writer import CHUNK_BYTES, BagWriter, TopicDefinition
+from formation_gnc.recording.topic_definition import TopicDefinition
+from formation_gnc.recording.writer import CHUNK_BYTES, BagWriter
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
 from formation_gnc.transport.in_process_recorder import InProcessRecorder

@@ -13,7 +13,7 @@ from formation_gnc.errors import ConfigurationError
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says in one line what is wrong, as for everything else that is not allowed."""
+    """Prints errors in one line, as all other errors are."""
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"{self.prog}: {message}; see `{self.prog} --help`\n")
@@ -23,19 +23,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a subcommand.
 
     Returns:
-        0 when it did what it was asked, 1 when a run failed, 2 when what it was given is not allowed, 130
-        when interrupted.
+        Exit status: 0 for success, 1 when a run failed, 2 when an input is not allowed, 130 when interrupted.
     """
     parser = _Parser(
         prog="formation-gnc",
-        description="Fly satellites in formation in software-in-the-loop, and look at what they did.",
-        epilog="`formation-gnc COMMAND --help` says more of each command.",
+        description="Fly satellites in formation in software-in-the-loop; analyse, compare and replay the runs.",
+        epilog="`formation-gnc COMMAND --help` describes each command.",
     )
     parser.add_argument("--version", action="version", version=f"formation-gnc {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     if arguments is None:
         arguments = sys.argv[1:]
-    # Only what is asked for is imported: a flight need not wait for the libraries of plots and reports.
+    # Import only the command that runs: the libraries of plots and reports take long to load.
     for name in arguments[:1] if set(arguments[:1]) & set(COMMANDS) else COMMANDS:
         command = import_module(f"formation_gnc.commands.{name}")
         doc = (command.__doc__ or "").strip()
@@ -48,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         command.add_arguments(subparser)
         subparser.set_defaults(run=command.run)
     options = parser.parse_args(arguments)
-    # A polite kill ends a run as Ctrl-C does: everything stops, the bag is closed.
+    # SIGTERM ends a run as Ctrl-C does: all processes stop and the bag is closed.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         return int(options.run(options))

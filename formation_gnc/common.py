@@ -1,21 +1,21 @@
-"""What every node of a run is told alike."""
+"""Parameters that all nodes of a run share."""
 
 from dataclasses import dataclass
 from functools import cached_property
 from math import sqrt
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import ParameterError
 from formation_gnc.orbit.constants import MU
 from formation_gnc.parameters import parameter
 from formation_gnc.types import NANOSECONDS
 
 LAST_SECOND = 2**31 - 1
-"""Largest time (s) that a message's stamp can carry."""
+"""Largest time (s) that the stamp of a message holds."""
 
 
 @dataclass(frozen=True)
 class Orbit:
-    """The chief's osculating elements at the start of the run."""
+    """Osculating elements of the chief at the start of the run."""
 
     semi_major_axis: float = parameter(unit="m", above=0.0, maximum=1e9, doc="semi-major axis")
     eccentricity: float = parameter(0.0, minimum=0.0, maximum=0.99, doc="eccentricity")
@@ -26,12 +26,12 @@ class Orbit:
 
 
 ANY_ORBIT = Orbit(7e6)
-"""For nodes that do not depend on the chief, of which every scenario's file tells all."""
+"""Placeholder for nodes that do not use the chief's orbit."""
 
 
 @dataclass(frozen=True)
 class CommonParameters:
-    """Base of every node's schema; in a scenario file it stands once, under ``/**``."""
+    """Base of every node's schema; set once in a scenario file, under ``/**``."""
 
     chief: Orbit
     tick: float = parameter(
@@ -44,15 +44,15 @@ class CommonParameters:
     )
 
     def __post_init__(self) -> None:
-        """Raise ConfigurationError for a tick that nanosecond stamps cannot carry exactly."""
+        """Raise ParameterError for a tick that is not a whole number of nanoseconds."""
         if abs(self.tick * NANOSECONDS - self.tick_ns) > 1e-3 or self.tick_ns < 1:
-            raise ConfigurationError(
+            raise ParameterError(
                 f"parameter tick: {self.tick!r} is not allowed; it must be a whole number of nanoseconds"
             )
 
     @cached_property
     def tick_ns(self) -> int:
-        """The tick in nanoseconds."""
+        """Tick, ns."""
         return round(self.tick * NANOSECONDS)
 
     @cached_property

@@ -1,13 +1,25 @@
-"""Errors that a user can act on."""
+"""Errors that a user can act on: each message names the thing, the value and what is allowed."""
 
 
 class ConfigurationError(ValueError):
-    """A value that cannot be flown: the message names the thing, the value and what is allowed.
+    """A value that is not allowed; base of all errors of this module.
 
-    Raised while a run is being set up or a parameter changed, never in flight. A command that meets one
-    prints its message as one line and ends with status 2.
+    Raised while a run is set up or a parameter changed, never in flight. A command prints the message as one
+    line and ends with status 2.
     """
+
+
+class ParameterError(ConfigurationError):
+    """A parameter that is unknown, missing, out of range or fixed in flight."""
+
+
+class OrbitError(ConfigurationError):
+    """Elements or a state that are no orbit, or one outside a model's validity."""
 
 
 class DesignError(ConfigurationError):
     """A control law or filter that cannot be designed from its parameters."""
+
+
+class BagError(ConfigurationError):
+    """A bag that cannot be read or written, or lacks a topic or field that is asked for."""

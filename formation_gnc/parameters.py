@@ -1,9 +1,9 @@
-"""One typed schema per node for its parameters.
+"""Typed schemas of parameters.
 
-A schema is a frozen dataclass whose fields are made with :func:`parameter`. Declaration as ROS parameters,
-checks, YAML defaults and the reference page all come from it. Nested schemas become dotted names; a field
-made with :func:`per_name` holds one nested schema for every name that another field lists, and those names
-are the prefix: ``deputy1.mass``.
+A schema is a frozen dataclass whose fields are made with :func:`parameter`. The declaration as ROS
+parameters, checks, YAML defaults and the reference page all derive from it. Nested schemas become dotted
+names; a field made with :func:`per_name` holds a nested schema for every name that another field lists, with
+the name as prefix: ``deputy1.mass``.
 """
 
 import dataclasses
@@ -17,14 +17,14 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 import yaml
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import ParameterError
 
 OWN_OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides")
-"""Beginnings of the names of parameters that every ROS node has, or may be given, besides its schema."""
+"""Prefixes of parameters that every ROS node may have besides its schema."""
 
 
 class _Loader(yaml.SafeLoader):
-    """Reads numbers such as 1e-6, which YAML 1.1 takes for text, as ROS reads them."""
+    """Reads numbers such as 1e-6, which are text in YAML 1.1, as ROS does."""
 
 
 _Loader.add_implicit_resolver(
@@ -33,25 +33,28 @@ _Loader.add_implicit_resolver(
 
 
 def read_yaml(text: str) -> Any:
-    """Contents of a YAML document of parameters; raises yaml.YAMLError when it is none."""
+    """Contents of a YAML document of parameters; raises yaml.YAMLError for invalid YAML."""
     return yaml.load(text, Loader=_Loader)
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a parameter means and which values it may take."""
+    """Meaning of a parameter and its allowed values."""
 
     doc: str
     unit: str = ""
     minimum: float = -math.inf
     above: float = -math.inf
+    """Exclusive lower bound."""
     maximum: float = math.inf
     choices: tuple[str, ...] = ()
     length: int | None = None
+    """Number of values of an array; None for any."""
     in_flight: bool = False
+    """Whether it may change in flight."""
 
     def allowed(self) -> str:
-        """Say in words which values are allowed."""
+        """Allowed values in words."""
         words = []
         if self.choices:
             words.append("one of " + ", ".join(self.choices))
@@ -67,18 +70,18 @@ class Limits:
 
 
 def parameter(default: Any = MISSING, **limits: Any) -> Any:
-    """Declare one parameter: its default (none: it must be given) and its :class:`Limits` by keyword."""
+    """Declare a parameter: its default (without one it is required) and its :class:`Limits` by keyword."""
     return dataclasses.field(default=default, metadata={"limits": Limits(**limits)})
 
 
 def per_name(names: str) -> Any:
-    """Declare a dict of nested schemas, one for each name in the parameter `names`."""
+    """Declare a dict of nested schemas, one for each name that the parameter `names` lists."""
     return dataclasses.field(default_factory=dict, metadata={"names": names})
 
 
 @dataclass(frozen=True)
 class Leaf:
-    """One parameter with its full dotted name, its Python type and default."""
+    """A parameter with its full dotted name, Python type and default."""
 
     name: str
     type: Any
@@ -87,14 +90,18 @@ class Leaf:
 
     @property
     def type_name(self) -> str:
-        """The type as a ROS 2 user knows it."""
+        """Name of the type in ROS 2."""
         scalar = {bool: "bool", int: "integer", float: "double", str: "string"}
         if get_origin(self.type) is tuple:
             return f"{scalar[get_args(self.type)[0]]} array"
         return scalar[self.type]
 
     def check(self, value: Any) -> Any:
-        """Return `value` in the parameter's own type, or raise ConfigurationError saying what is allowed."""
+        """`value` in the parameter's type.
+
+        Raises:
+            ParameterError: the value is not allowed.
+        """
         if get_origin(self.type) is not tuple:
             return self._check_scalar(value, self.type)
         if not _is_list(value):
@@ -120,8 +127,8 @@ class Leaf:
             raise self._rejection(value, limits.allowed())
         return value
 
-    def _rejection(self, value: Any, allowed: str) -> ConfigurationError:
-        return ConfigurationError(f"parameter {self.name}: {value!r} is not allowed; it must be {allowed}")
+    def _rejection(self, value: Any, allowed: str) -> ParameterError:
+        return ParameterError(f"parameter {self.name}: {value!r} is not allowed; it must be {allowed}")
 
 
 def _is_list(value: Any) -> bool:
@@ -129,10 +136,14 @@ def _is_list(value: Any) -> bool:
 
 
 def leaves(schema: type, values: Mapping[str, Any], prefix: str = "", defaults: Any = MISSING) -> Iterator[Leaf]:
-    """Every parameter of a schema, in order.
+    """All parameters of a schema, in order.
 
-    `values` (dotted names) tells which names `per_name` has; the fields of the instance `defaults` go before
-    the schema's own defaults, so that two nested schemas of one kind may have different ones.
+    Args:
+        schema: dataclass of parameters.
+        values: by dotted name; those of lists of names define the nested schemas of `per_name`.
+        prefix: of the dotted names.
+        defaults: instance whose fields override the schema's defaults, so that two nested schemas of one
+            type may have different ones.
     """
     hints = get_type_hints(schema)
     fields = {field.name: field for field in dataclasses.fields(schema)}
@@ -152,24 +163,23 @@ def leaves(schema: type, values: Mapping[str, Any], prefix: str = "", defaults: 
 
 
 def load[T](schema: type[T], values: Mapping[str, Any]) -> T:
-    """Build a schema's instance from dotted names.
+    """Instance of a schema from values by dotted name.
 
     Raises:
-        ConfigurationError: unknown, missing, mistyped, out of range or not finite; the message names the
-            parameter, the value and what is allowed.
+        ParameterError: a parameter is unknown, missing, of another type, out of range or not finite.
     """
     known = {leaf.name: leaf for leaf in leaves(schema, values)}
     for name in values:
         if name not in known:
             near = difflib.get_close_matches(name, known, n=1)
             hint = f"did you mean {near[0]}?" if near else "known: " + ", ".join(sorted(known))
-            raise ConfigurationError(f"parameter {name}: unknown; {hint}")
+            raise ParameterError(f"parameter {name}: unknown; {hint}")
     checked = {}
     for leaf in known.values():
         if leaf.name in values:
             checked[leaf.name] = leaf.check(values[leaf.name])
         elif leaf.default is MISSING:
-            raise ConfigurationError(f"parameter {leaf.name}: missing; give a {leaf.type_name}")
+            raise ParameterError(f"parameter {leaf.name}: missing; give a {leaf.type_name}")
         else:
             checked[leaf.name] = leaf.default
     return _build(schema, checked, "")
@@ -196,7 +206,7 @@ def _build[T](schema: type[T], checked: Mapping[str, Any], prefix: str) -> T:
 
 
 def dump(instance: Any, prefix: str = "") -> dict[str, Any]:
-    """The dotted names and values of an instance: the inverse of :func:`load`."""
+    """Values of an instance by dotted name, the inverse of :func:`load`."""
     flat: dict[str, Any] = {}
     for field in dataclasses.fields(instance):
         value = getattr(instance, field.name)
@@ -211,15 +221,15 @@ def dump(instance: Any, prefix: str = "") -> dict[str, Any]:
 
 
 def change[T](instance: T, changes: Mapping[str, Any]) -> T:
-    """A copy of `instance` with parameters changed in flight.
+    """Copy of `instance` with parameters changed in flight.
 
     Raises:
-        ConfigurationError: as :func:`load`, or a parameter that may not change in flight.
+        ParameterError: as for :func:`load`, or a parameter cannot change in flight.
     """
     values = dump(instance)
     for leaf in leaves(type(instance), values):
         if leaf.name not in changes or leaf.limits.in_flight:
             continue
         if leaf.check(changes[leaf.name]) != values[leaf.name]:
-            raise ConfigurationError(f"parameter {leaf.name}: cannot change in flight; set it at the start")
+            raise ParameterError(f"parameter {leaf.name}: cannot change in flight; set it at the start")
     return load(type(instance), values | dict(changes))

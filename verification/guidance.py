@@ -27,7 +27,7 @@ from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.forces import Forces
 from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
 from formation_gnc.orbit.propagation import Propagator
-from formation_gnc.recording.reader import Bag, identical
+from formation_gnc.recording import Bag, identical
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.tschauner_hempel import TschaunerHempelModel
 from verification.figure import TABLE, Figure, failures

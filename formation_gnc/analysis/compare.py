@@ -1,36 +1,48 @@
-"""Runs side by side: their figures, and what differs."""
+"""Recorded runs side by side: their figures, topics and curves."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from formation_gnc.analysis.matplotlib_renderer import draw
 from formation_gnc.analysis.metrics import deputies_of, figures, trajectory
-from formation_gnc.analysis.run_history import POINTS
+from formation_gnc.analysis.plot import COLOURS, TIME, Axis, Curve, Plot, Style
+from formation_gnc.analysis.thinning import POINTS
 from formation_gnc.recording.reader import Bag
 from formation_gnc.types import Vector
 
-OF_WALL_TIME = "formation_gnc_msgs/msg/Timing"
+TIMING_TYPE = "formation_gnc_msgs/msg/Timing"
+"""Message type of wall time, in which two equal runs differ."""
+
+AXES = (
+    Axis("control error", "m", log=True),
+    Axis("estimation error", "m", log=True),
+    Axis("delta-v applied", "mm/s"),
+    Axis("delta-v commanded", "mm/s"),
+)
+"""Quantities that are compared over time."""
 
 
 def gnc_topics(*bags: Bag) -> list[str]:
-    """Topics of the bags that the same run fills with the same bits: the project's own, but for wall time."""
+    """Topics on which two equal runs have the same bits: the clock and the project's own but timing."""
     types = {topic: each.type_name for bag in bags for topic, each in bag.topics.items()}
     return sorted(
         topic
-        for topic, kind in types.items()
-        if topic == "/clock" or (kind.startswith("formation_gnc_msgs/") and kind != OF_WALL_TIME)
+        for topic, name in types.items()
+        if topic == "/clock" or (name.startswith("formation_gnc_msgs/") and name != TIMING_TYPE)
     )
 
 
-def commanded(bag: Bag, deputy: str) -> tuple[Vector, Vector]:
-    """What the controller asked for, whether or not it was flown.
+def commanded_delta_v(bag: Bag, deputy: str) -> tuple[Vector, Vector]:
+    """Delta-v that the controller commanded, whether or not it was applied.
 
     Returns:
-        (N,) time, s, and (N,) delta-v commanded up to the end of that tick, all axes added, m/s.
+        (N,) time, s, and (N,) delta-v up to the end of that tick, all axes added, m/s.
     """
     topic = f"/{deputy}/thrust"
     if topic not in bag.topics or bag.topics[topic].count == 0:
@@ -43,49 +55,46 @@ def commanded(bag: Bag, deputy: str) -> tuple[Vector, Vector]:
 
 
 def run_figures(bag: Bag) -> dict[str, dict[str, float]]:
-    """Figures of a run by name, for the run as a whole ("") and for each deputy."""
+    """Figures of a run by name, for the run as a whole ("") and for each deputy.
+
+    Raises:
+        BagError: no truth, or a deputy without estimates or targets.
+    """
     result = figures(bag)
     table: dict[str, dict[str, float]] = {"": {"ticks": result.ticks, "misses": result.misses}}
     for name, deputy in result.deputies.items():
         values = asdict(deputy)
         for axis, value in zip("xyz", values.pop("delta_v_axes_m_s"), strict=True):
             values[f"delta_v_{axis}_m_s"] = value
-        _, spent = commanded(bag, name)
-        values["commanded_delta_v_m_s"] = float(spent[-1]) if len(spent) else 0.0
+        _, delta_v = commanded_delta_v(bag, name)
+        values["commanded_delta_v_m_s"] = float(delta_v[-1]) if len(delta_v) else 0.0
         table[name] = values
     return table
 
 
 def draw_comparison(bags: Sequence[Bag], labels: Sequence[str], path: Path) -> None:
-    """Draw errors, flown and commanded delta-v over time: a row a deputy, a curve a bag."""
+    """Draw errors, applied and commanded delta-v over time: a row per deputy, a curve per bag."""
     names = list(dict.fromkeys(name for bag in bags for name in deputies_of(bag)))
     figure = Figure(figsize=(19.0, 4.2 * len(names) + 0.4), layout="constrained", dpi=100)
     FigureCanvasAgg(figure)
-    for row, name in zip(figure.subplots(len(names), 4, squeeze=False), names, strict=True):
-        for bag, label in zip(bags, labels, strict=True):
-            if name not in deputies_of(bag):
-                continue
-            flown = trajectory(bag, name)
-            spent = np.cumsum(np.abs(flown.applied).sum(axis=1)) * flown.tick
-            curves = (
-                (flown.time, np.linalg.norm(flown.error, axis=1)),
-                (flown.time, np.linalg.norm(flown.estimation_error[:, :3], axis=1)),
-                (flown.applied_time, 1e3 * spent),
-                (commanded(bag, name)[0], 1e3 * commanded(bag, name)[1]),
-            )
-            for axes, (time, values) in zip(row, curves, strict=True):
-                step = max(1, len(time) // POINTS)
-                axes.plot(time[::step] / 3600.0, values[::step], lw=1.1, label=label)
-        said = (
-            "control error [m]",
-            "estimation error [m]",
-            "delta-v flown [mm/s]",
-            "delta-v commanded [mm/s]",
-        )
-        for axes, text in zip(row, said, strict=True):
-            axes.set(xlabel="time [h]", ylabel=text, title=name)
-            axes.grid(alpha=0.3)
-        for axes in row[:2]:
-            axes.set_yscale("log")
-        row[0].legend(loc="best", fontsize="small")
+    grid = figure.add_gridspec(len(names), len(AXES))
+    for row, name in enumerate(names):
+        curves: list[list[Curve]] = [[] for _ in AXES]
+        for bag, label, colour in zip(bags, labels, cycle(COLOURS), strict=False):
+            if name in deputies_of(bag):
+                for of_axis, (time, values) in zip(curves, _series(bag, name), strict=True):
+                    step = max(1, len(time) // POINTS)
+                    of_axis.append(Curve(label, time[::step] / 3600.0, values[::step], Style(colour, width=1.1)))
+        for column, (axis, of_axis) in enumerate(zip(AXES, curves, strict=True)):
+            draw(figure, grid[row, column], Plot(name, TIME, axis, of_axis))
     figure.savefig(path)
+
+
+def _series(bag: Bag, deputy: str) -> Iterator[tuple[Vector, Vector]]:
+    """Time (s) and values of each of AXES."""
+    path = trajectory(bag, deputy)
+    yield path.time, np.linalg.norm(path.error, axis=1)
+    yield path.time, np.linalg.norm(path.estimation_error[:, :3], axis=1)
+    yield path.applied_time, 1e3 * np.cumsum(np.abs(path.applied).sum(axis=1)) * path.tick
+    time, delta_v = commanded_delta_v(bag, deputy)
+    yield time, 1e3 * delta_v

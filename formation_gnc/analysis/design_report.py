@@ -1,4 +1,4 @@
-"""What a design is, before it flies: gains, poles, margins, bounds and sizes, as numbers and as a picture."""
+"""Report of a designed control law: gains, poles, margins, bounds and sizes, as figures and as a picture."""
 
 from dataclasses import dataclass, field
 from functools import reduce
@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from formation_gnc.analysis.plot import HILL_AXES
 from formation_gnc.control.controller import Controller, Vehicle
 from formation_gnc.control.linear import LinearController
 from formation_gnc.control.models import DESIGN_MODELS
@@ -18,35 +19,35 @@ from formation_gnc.relative.model import RelativeModel
 from formation_gnc.types import NANOSECONDS, Matrix, Vector
 
 FREQUENCIES = 200
-"""Frequencies at which singular values are taken, up to half the sampling rate."""
+"""Number of frequencies for singular values, up to half the sampling rate."""
 
 PLACES = 360
-"""Places of the orbit at which a loop that varies along it is closed."""
+"""Number of places along the orbit at which a periodic loop is closed."""
 
 
 @dataclass(frozen=True)
 class Design:
-    """A designed law, looked at from outside; its loop is the sampled one, without limits.
+    """A designed law, seen from outside: its sampled loop without thrust limits.
 
-    A loop that varies along the orbit has characteristic exponents for poles; its singular values and margins
-    are those of the loop as it is at the start.
+    The poles of a periodic loop are its characteristic exponents; its singular values and margins are those
+    of the loop at the start.
     """
 
     algorithm: str
     figures: dict[str, Any]
-    """Name, with unit, and value: numbers, or lists of them."""
+    """Value, a number or a list, by name with unit."""
     poles: Vector = field(default_factory=lambda: np.empty(0, dtype=complex))
-    """(n,) continuous equivalents of the closed loop's poles, 1/s."""
+    """(n,) continuous-time equivalents of the closed-loop poles, 1/s."""
     frequency: Vector = field(default_factory=lambda: np.empty(0))
     """(N,) rad/s."""
     singular_values: dict[str, Matrix] = field(default_factory=dict)
-    """Name and (N, 3) singular values; "gamma / ..." are bounds."""
+    """(N, 3) singular values by name; "gamma / ..." are bounds."""
     recovery: Matrix = field(default_factory=lambda: np.empty((0, 4)))
-    """(N, 4) time, s, and position error, m, after an offset of 1 m in every axis."""
+    """(N, 4) time, s, and position error, m, from an initial offset of 1 m in every axis."""
 
 
 def design(parameters: Any) -> Design:
-    """Design the law that the controller node's parameters name, and describe it.
+    """Design the law that parameters of a controller select, and report it.
 
     Raises:
         ConfigurationError: it cannot be designed.
@@ -76,15 +77,15 @@ def _is_bound(name: str) -> bool:
 
 
 def _loops(law: Controller, model: RelativeModel, tick: float) -> tuple[list[Matrix], int]:
-    """Loops closed over a tick, at one place of the orbit or at `PLACES`, and for how many ticks each
-    stands."""
+    """Closed-loop transition matrices over a tick, at one place of the orbit or at `PLACES`, and the number
+    of ticks for which each holds."""
     places = 1 if model.is_time_invariant else PLACES
     repeats = 1 if model.is_time_invariant else max(1, round(model.period / places / tick))
     loops = []
     for place in range(places):
         time = (place + 0.5) * repeats * tick if places > 1 else 0.0
         controller = law.linear(round(time * NANOSECONDS))
-        assert controller is not None, "a law that is linear once always is"
+        assert controller is not None, "a law is linear at all times or never"
         loops.append(controller.closed_loop(*model.discretise(time, tick)))
     return loops, repeats
 
@@ -94,13 +95,18 @@ def _or_none(value: float) -> float | None:
 
 
 def _input_loop(controller: LinearController, phi: Matrix, gamma: Matrix, angle: Vector) -> dict[str, Matrix]:
-    """Singular values (N, 3) of S_I = (I + K G)^-1 and T_I of the loop cut at the thrusters, at angles (N,)
-    of z."""
-    seen = np.eye(6)[: controller.b.shape[1]]
+    """Singular values (N, 3) of S_I = (I + K G)^-1 and T_I of the loop broken at the thrusters.
+
+    Args:
+        controller: K.
+        phi, gamma: of the plant G, (6, 6) and (6, 3).
+        angle: (N,) of z on the unit circle, rad.
+    """
+    output = np.eye(6)[: controller.b.shape[1]]
     sensitivity, complement = [], []
     for each in angle:
         z = np.exp(1j * each)
-        plant = seen @ np.linalg.solve(z * np.eye(6) - phi, gamma)
+        plant = output @ np.linalg.solve(z * np.eye(6) - phi, gamma)
         size = len(controller.a)
         law = controller.c @ np.linalg.solve(z * np.eye(size) - controller.a, controller.b) + controller.d
         s = np.linalg.inv(np.eye(3) - law @ plant)
@@ -110,8 +116,8 @@ def _input_loop(controller: LinearController, phi: Matrix, gamma: Matrix, angle:
 
 
 def _margins(values: dict[str, Matrix]) -> dict[str, Any]:
-    """What all three thrusters' gains, or phases, may be off by at once, each on its own, without loss of
-    stability."""
+    """Multivariable margins: simultaneous, independent errors of all thrusters' gains, or phases, that the
+    loop tolerates."""
     s, t = float(values["S_I"].max()), float(values["T_I"].max())
     up = max(s / (s - 1.0) if s > 1.0 else inf, 1.0 + 1.0 / t)
     down = min(s / (s + 1.0), max(1.0 - 1.0 / t, 0.0))
@@ -139,7 +145,7 @@ def _recovery(loops: list[Matrix], repeats: int, tick: float, poles: Vector) -> 
 
 
 def draw(designed: Design, path: Path) -> Path:
-    """Draw singular values, poles and recovery to a PNG file."""
+    """Draw singular values, poles and recovery to a picture."""
     figure = Figure(figsize=(17.0, 5.0), layout="constrained", dpi=100)
     FigureCanvasAgg(figure)
     values, plane, time = figure.subplots(1, 3)
@@ -152,10 +158,10 @@ def draw(designed: Design, path: Path) -> Path:
         values.legend(fontsize="small")
     plane.plot(designed.poles.real, designed.poles.imag, "x")
     plane.set_xscale("symlog", linthresh=1e-3)
-    plane.set(xlabel="real part [1/s]", ylabel="imaginary part [rad/s]", title="poles of the closed loop")
-    for axis, label in enumerate(("x radial", "y along-track", "z cross-track")):
+    plane.set(xlabel="real part [1/s]", ylabel="imaginary part [rad/s]", title="closed-loop poles")
+    for axis, label in enumerate(HILL_AXES):
         time.plot(designed.recovery[:, 0] / 60.0, designed.recovery[:, axis + 1], label=label)
-    time.set(xlabel="time [min]", ylabel="position error [m]", title="after 1 m in every axis, without limits")
+    time.set(xlabel="time [min]", ylabel="position error [m]", title="from 1 m in every axis, without limits")
     time.legend(fontsize="small")
     for axes in (values, plane, time):
         axes.grid(alpha=0.3)

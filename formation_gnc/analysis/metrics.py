@@ -1,10 +1,10 @@
-"""Figures of a recorded run."""
+"""Figures of merit of a recorded run."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import BagError
 from formation_gnc.recording.reader import Bag
 from formation_gnc.records import EventKind
 from formation_gnc.types import Matrix, Vector
@@ -12,24 +12,24 @@ from formation_gnc.types import Matrix, Vector
 
 @dataclass(frozen=True)
 class Trajectory:
-    """What a bag says of one deputy, tick by tick, over the ticks on which every part answered."""
+    """States of one deputy at the ticks that all of its modules answered."""
 
     time: Vector
     """(N,) simulated time, s."""
     truth: Matrix
     """(N, 6) true relative states, Hill frame, m and m/s."""
     estimate: Matrix
-    """(N, 6) estimated ones."""
+    """(N, 6) estimated relative states."""
     sigma: Matrix
-    """(N, 6) standard deviations of the estimate by the filter's own covariance."""
+    """(N, 6) standard deviations from the covariance of the filter."""
     target: Matrix
     """(N, 6) target states."""
     nis: Vector
     """(N,) normalised innovation squared; 0 on ticks without readings."""
     applied: Matrix
-    """(M, 3) accelerations by thrust over each tick, Hill frame, m/s^2; on all ticks of the truth."""
+    """(M, 3) accelerations by thrust over each tick of the truth, Hill frame, m/s^2."""
     applied_time: Vector
-    """(M,) time at which each of those ticks began, s."""
+    """(M,) start of each of those ticks, s."""
     tick: float
     """Length of a tick, s."""
 
@@ -51,7 +51,7 @@ class Trajectory:
 
 @dataclass(frozen=True)
 class DeputyFigures:
-    """How well one deputy flew; `formation-gnc sil --json` prints these names."""
+    """Figures of one deputy, by the names that `formation-gnc sil --json` prints."""
 
     final_error_m: float
     rms_error_m: float
@@ -71,29 +71,33 @@ class RunFigures:
 
 
 def deputies_of(bag: Bag) -> list[str]:
-    """Names of the deputies in a bag, in its own order of truth."""
+    """Names of the deputies in a bag, in the order of its truth.
+
+    Raises:
+        BagError: no truth.
+    """
     if "/truth" not in bag.topics or bag.topics["/truth"].count == 0:
-        raise ConfigurationError(f"{bag.path}: has no truth to measure a run by")
+        raise BagError(f"{bag.path}: has no truth")
     _, first = next(bag.batches(["/truth"], 1))
     count = sum(key.endswith(".name") for key in first)
     return [str(first[f"deputies.{index}.name"][0]) for index in range(count)]
 
 
 def trajectory(bag: Bag, deputy: str) -> Trajectory:
-    """The trajectory of one deputy.
+    """Trajectory of one deputy.
 
     Raises:
-        ConfigurationError: no truth, or no ticks on which this deputy has an estimate and a target.
+        BagError: no truth, or no tick with an estimate and a target of this deputy.
     """
     truth = bag.arrays("/truth")
     index = deputies_of(bag).index(deputy)
     missing = [topic for topic in ("estimate", "target") if f"/{deputy}/{topic}" not in bag.topics]
     if missing:
-        raise ConfigurationError(f"{bag.path}: has no {' and no '.join(missing)} of {deputy}")
+        raise BagError(f"{bag.path}: has no {' and no '.join(missing)} of {deputy}")
     estimate, target = bag.arrays(f"/{deputy}/estimate"), bag.arrays(f"/{deputy}/target")
     stamps = np.intersect1d(np.intersect1d(truth["stamp_ns"], estimate["stamp_ns"]), target["stamp_ns"])
     if not len(stamps):
-        raise ConfigurationError(f"{bag.path}: {deputy} never answered")
+        raise BagError(f"{bag.path}: no tick with an estimate and a target of {deputy}")
     rows = {id(part): np.searchsorted(part["stamp_ns"], stamps) for part in (truth, estimate, target)}
     prefix = f"deputies.{index}."
     time = truth["time"]
@@ -106,7 +110,7 @@ def trajectory(bag: Bag, deputy: str) -> Trajectory:
         sigma=np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)),
         target=target["relative_state"][rows[id(target)]],
         nis=estimate["nis"][rows[id(estimate)]],
-        # truth at a tick holds the force of the tick before
+        # Truth holds the force of the tick before.
         applied=(truth[f"{prefix}applied_force"] / truth[f"{prefix}mass"][:, None])[1:],
         applied_time=time[:-1],
         tick=tick,
@@ -114,21 +118,25 @@ def trajectory(bag: Bag, deputy: str) -> Trajectory:
 
 
 def figures(bag: Bag) -> RunFigures:
-    """The figures of a run."""
+    """Figures of a run.
+
+    Raises:
+        BagError: as for `trajectory`.
+    """
     deputies = {}
     for name in deputies_of(bag):
-        flown = trajectory(bag, name)
-        error = np.linalg.norm(flown.error, axis=1)
-        estimation = np.linalg.norm(flown.estimation_error[:, :3], axis=1)
-        measured = flown.nis[flown.nis > 0.0]
+        path = trajectory(bag, name)
+        error = np.linalg.norm(path.error, axis=1)
+        estimation = np.linalg.norm(path.estimation_error[:, :3], axis=1)
+        measured = path.nis[path.nis > 0.0]
         deputies[name] = DeputyFigures(
             final_error_m=float(error[-1]),
             rms_error_m=float(np.sqrt(np.mean(error**2))),
             estimate_rms_m=float(np.sqrt(np.mean(estimation**2))),
             mean_nis=float(measured.mean()) if len(measured) else 0.0,
-            delta_v_m_s=float(flown.delta_v.sum()),
-            delta_v_axes_m_s=flown.delta_v.tolist(),
+            delta_v_m_s=float(path.delta_v.sum()),
+            delta_v_axes_m_s=path.delta_v.tolist(),
         )
     has_events = "/events" in bag.topics and bag.topics["/events"].count > 0
-    misses = np.count_nonzero(bag.arrays("/events")["kind"] == EventKind.MISS) if has_events else 0
+    misses = np.count_nonzero(bag.arrays("/events").integers("kind") == EventKind.MISS) if has_events else 0
     return RunFigures(bag.topics["/truth"].count, int(misses), deputies)

@@ -1,4 +1,4 @@
-"""How near satellites came to one another."""
+"""Distances between satellites."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,18 +14,18 @@ from formation_gnc.types import Matrix, Vector
 
 @dataclass(frozen=True)
 class Separation:
-    """The nearest approach of a fleet."""
+    """Nearest approach of a fleet."""
 
     distance: float
     """m."""
     time: float
-    """When, s."""
+    """s."""
     pair: tuple[str, str]
-    """Who."""
+    """Names of the two satellites."""
 
 
 def minimum_separation(times: Vector, positions: Matrix, names: Sequence[str]) -> Separation | None:
-    """Nearest approach of any two satellites, at the instants given; none for fewer than two.
+    """Nearest approach of any two satellites at given times; None for fewer than two.
 
     Args:
         times: (N,) s.
@@ -42,21 +42,24 @@ def minimum_separation(times: Vector, positions: Matrix, names: Sequence[str]) -
 
 
 def predicted_approach(bag: Bag, kind: str) -> Separation | None:
-    """Nearest approach that guidance foresaw in a recorded run; none when it looked for none.
+    """Nearest approach that guidance predicted in a recorded run; None without predictions.
 
     Args:
         bag: of the run.
         kind: "planned" or "passive", as in Separation.msg.
+
+    Raises:
+        BagError: no truth.
     """
     nearest: Separation | None = None
     for name in deputies_of(bag):
         topic = f"/{name}/separation"
         if topic not in bag.topics or not bag.topics[topic].count:
             continue
-        foreseen = bag.arrays(topic)
-        index = int(foreseen[kind].argmin())
-        distance = float(foreseen[kind][index])
+        predicted = bag.arrays(topic)
+        index = int(predicted[kind].argmin())
+        distance = float(predicted[kind][index])
         if nearest is None or distance < nearest.distance:
-            when, other = 1e-9 * nanoseconds(foreseen, f"{kind}_time")[index], str(foreseen[f"{kind}_neighbour"][index])
+            when, other = 1e-9 * nanoseconds(predicted, f"{kind}_time")[index], str(predicted[f"{kind}_neighbour"][index])
             nearest = Separation(distance, float(when), (name, other))
     return nearest

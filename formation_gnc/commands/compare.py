@@ -1,7 +1,7 @@
-"""Compare recorded runs: their figures side by side, and whether they are the same bits.
+"""Compare recorded runs: their figures side by side, and whether they are identical bit for bit.
 
-Differences are against the first bag. Two runs are the same when every message of every GNC topic is, bit for
-bit; wall-clock topics do not count.
+Differences are against the first bag. Runs are identical when every message of every GNC topic is; topics of
+wall time do not count.
 """
 
 import argparse
@@ -14,22 +14,22 @@ from rich.table import Table
 
 from formation_gnc.analysis.compare import draw_comparison, gnc_topics, run_figures
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.recording.reader import Bag, Difference, identical
+from formation_gnc.recording import Bag, Difference, identical
 
-SAME = "identical on every GNC topic"
+IDENTICAL = "identical on every GNC topic"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     parser.add_argument("bags", metavar="bag", nargs="+", type=Path, help="two or more bags")
-    parser.add_argument("--plot", metavar="FILE", type=Path, help="draw them over time: .png, .pdf or .svg")
-    parser.add_argument("--json", action="store_true", help="print all as one JSON object")
+    parser.add_argument("--plot", metavar="FILE", type=Path, help="plot errors and delta-v: .png, .pdf or .svg")
+    parser.add_argument("--json", action="store_true", help="print the result as one JSON object")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compare, print, draw."""
+    """Compare, plot and print."""
     if len(options.bags) < 2:
-        raise ConfigurationError("compare: takes two bags or more")
+        raise ConfigurationError("compare: one bag is not allowed; it must be two or more")
     if options.plot is not None and options.plot.suffix not in (".png", ".pdf", ".svg"):
         raise ConfigurationError(f"plot {options.plot}: is not allowed; it must be a .png, .pdf or .svg file")
     bags = [Bag(path) for path in options.bags]
@@ -87,6 +87,6 @@ def _print(paths: list[Path], figures: list[dict[str, dict[str, float]]], differ
         table.add_row(escape(f"{part} {name}".strip()), *cells)
     console.print(table)
     for path, found in zip(paths[1:], differences, strict=True):
-        print(f"{path}: {SAME}" if not found else f"{path}: differs from {paths[0]}, first of each topic:")
+        print(f"{path}: {IDENTICAL}" if not found else f"{path}: differs from {paths[0]}, first of each topic:")
         for difference in found:
             print(f"  {difference}")

@@ -1,6 +1,6 @@
-"""Design a scenario's control law and describe it, without flying.
+"""Design the control law of a scenario and report it, without a flight.
 
-Gains, poles of the closed loop, margins, gamma, horizon and size of the programme, as the law has them.
+Gains, closed-loop poles, margins, gamma, horizon and size of the optimisation problem, as the law has them.
 """
 
 import argparse
@@ -21,12 +21,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     parser.add_argument("scenario", help="name of a scenario in params/, or a ROS 2 parameter file")
     parser.add_argument("--controller", metavar="NAME", help=f"control law: {', '.join(ALGORITHMS)}")
-    parser.add_argument("--deputy", metavar="NAME", help="whose controller (default: the first deputy's)")
+    parser.add_argument("--deputy", metavar="NAME", help="deputy whose controller to design (default: the first)")
     parser.add_argument(
         "--plot",
         metavar="FILE",
         type=Path,
-        help="draw singular values, poles and recovery: .png, .pdf or .svg",
+        help="plot singular values, poles and recovery: .png, .pdf or .svg",
     )
     parser.add_argument("--json", action="store_true", help="print the figures as one JSON object")
 

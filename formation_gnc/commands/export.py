@@ -1,7 +1,7 @@
-"""Write topics of a recorded run as CSV or Parquet, and the files that it carries.
+"""Export topics of a recorded run as CSV or Parquet, and the files attached to it.
 
-A file a topic, `deputy1.estimate.csv` for /deputy1/estimate; a row a message, a column a field or an element
-of an array. In Python, `formation_gnc.recording.read(bag)` gives the same as pandas frames.
+A file per topic, such as `deputy1.estimate.csv` for /deputy1/estimate; a row per message, a column per field
+or array element. In Python, `formation_gnc.recording.read(bag)` returns the same as pandas frames.
 """
 
 import argparse
@@ -16,15 +16,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     parser.add_argument("bag", type=Path, help="bag directory or .mcap file")
     parser.add_argument(
-        "--topic", metavar="NAME", action="append", help="a topic to write, as often as wanted (default: all)"
+        "--topic", metavar="NAME", action="append", help="topic to export, may be repeated (default: all)"
     )
     parser.add_argument("--format", choices=("csv", "parquet"), default="csv", help="default: csv")
-    parser.add_argument("--attachments", action="store_true", help="write the attached files too")
+    parser.add_argument("--attachments", action="store_true", help="export the attached files too")
     parser.add_argument("--output", metavar="DIR", type=Path, help="directory to write to (default: BAG_export)")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write every topic that has messages, and say where."""
+    """Export the topics and print the paths."""
     bag = Bag(options.bag)
     source = options.bag.absolute()
     directory = options.output or source.with_name(f"{source.stem}_export")

@@ -1,7 +1,7 @@
-"""Rebuild a bag that was cut or damaged, as far as it can be read.
+"""Recover what is readable of a bag that was cut or damaged.
 
-Exit status 0: the bag is whole, or only its index was missing; 3: something is lost, and what; 1: nothing is
-left to save.
+Exit status: 0 when the bag is whole, or only lacks its index; 3 when messages are lost, which are listed; 1
+when there is nothing to save.
 """
 
 import argparse
@@ -22,11 +22,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help="directory to make (default: BAG_recovered)",
     )
-    parser.add_argument("--json", action="store_true", help="print what came of it as one JSON object")
+    parser.add_argument("--json", action="store_true", help="print the result as one JSON object")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Recover, and say what was lost."""
+    """Recover the bag and print what is lost."""
     bag = options.bag.absolute()
     try:
         recovery = recover(options.bag, options.output or bag.with_name(f"{bag.stem}_recovered"))

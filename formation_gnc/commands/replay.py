@@ -12,7 +12,7 @@ from pathlib import Path
 
 from formation_gnc.analysis.compare import gnc_topics
 from formation_gnc.flight.graph import MODULES
-from formation_gnc.recording.reader import Bag, identical
+from formation_gnc.recording import Bag, identical
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -1,7 +1,7 @@
-"""Write a recorded run as one self-contained HTML page, and as pictures.
+"""Report a recorded run as one self-contained HTML page, and as pictures.
 
-The page works offline: trajectory with a time slider, errors with 3-sigma bounds, measurements and
-innovations, thrust, solver and timing, events on every time axis, parameters and provenance.
+The page works offline. It shows trajectories with a time slider, errors with 3-sigma bounds, measurements
+and innovations, thrust, solver and timing with the events on every time axis, parameters and provenance.
 """
 
 import argparse
@@ -15,11 +15,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     parser.add_argument("bag", type=Path, help="bag directory or .mcap file")
     parser.add_argument("--output", metavar="FILE", type=Path, help="page to write (default: report.html in the bag)")
-    parser.add_argument("--pictures", metavar="DIR", type=Path, help="directory for PNG files, for a README or a paper")
+    parser.add_argument("--pictures", metavar="DIR", type=Path, help="directory for PNG files: overview and panels")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Read, draw, write."""
+    """Read the bag, write the page and the pictures."""
     from formation_gnc.analysis.overview import draw_overview, draw_panels
     from formation_gnc.analysis.report import write_report
     from formation_gnc.analysis.run_history import RunHistory
@@ -28,14 +28,14 @@ def run(options: argparse.Namespace) -> int:
     title = options.bag.absolute().name
     directory = options.bag if options.bag.is_dir() else options.bag.parent
     page = options.output or directory / "report.html"
-    flown = RunHistory(bag)
+    history = RunHistory(bag)
     try:
-        write_report(bag, flown, page, title)
+        write_report(bag, history, page, title)
         print(f"report: {page}")
         if options.pictures is not None:
             options.pictures.mkdir(parents=True, exist_ok=True)
-            overview = draw_overview(flown, options.pictures / "overview.png", title)
-            for picture in [overview, *draw_panels(flown, options.pictures)]:
+            overview = draw_overview(history, options.pictures / "overview.png", title)
+            for picture in [overview, *draw_panels(history, options.pictures)]:
                 print(f"picture: {picture}")
     except OSError as error:
         raise ConfigurationError(f"report {error.filename}: {error.strerror or error}") from None

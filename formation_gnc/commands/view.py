@@ -1,8 +1,8 @@
-"""Show a running graph live in Foxglove, or play a bag to it.
+"""View a running graph live in Foxglove, or play a bag in it.
 
-Serves the Foxglove WebSocket protocol on this machine: open the page that is printed in a browser, or connect
-the app to the address, and import the layout. The graph is that of ROS_DOMAIN_ID, which `formation-gnc sil`
-prints. A bag's viewers may pause, seek and change the speed.
+Serves the Foxglove WebSocket protocol on this machine: open the printed page in a browser, or connect the app
+to the printed address, and import the layout. The graph is that of ROS_DOMAIN_ID, which `formation-gnc sil`
+prints. While a bag is played, viewers may pause, seek and change the speed.
 """
 
 import argparse
@@ -20,24 +20,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="X",
         type=float,
         default=100.0,
-        help="simulated seconds of the bag per wall second, to begin with (default: 100)",
+        help="initial speed in simulated seconds per wall second (default: 100)",
     )
-    parser.add_argument("--port", metavar="N", type=int, default=8765, help="port; 0 for a free one (8765)")
-    parser.add_argument(
-        "--layout", metavar="FILE", type=Path, help="write the layout there that shows the deputies there are"
-    )
+    parser.add_argument("--port", metavar="N", type=int, default=8765, help="port, 0 for any free one (default: 8765)")
+    parser.add_argument("--layout", metavar="FILE", type=Path, help="file to write the layout of the deputies to")
 
 
 def run(options: argparse.Namespace) -> int:
     """Serve until interrupted."""
     try:
-        from formation_gnc.recording.live import LiveView, Player
+        from formation_gnc.recording.live import LiveView
+        from formation_gnc.recording.live_player import LivePlayer
     except ImportError:
         raise ConfigurationError("foxglove-sdk is not installed: pip install foxglove-sdk") from None
     from formation_gnc.recording.reader import Bag
     from formation_gnc.transport.viewer import show_graph
 
-    player = Player(Bag(options.bag), options.port, options.layout, options.rate) if options.bag else None
+    player = LivePlayer(Bag(options.bag), options.port, options.layout, options.rate) if options.bag else None
     view = player.view if player else LiveView("formation_gnc", options.port, options.layout)
     stopped: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 
 from formation_gnc.common import CommonParameters
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import ConfigurationError, ParameterError
 from formation_gnc.parameters import change, dump, parameter, read_yaml, to_json
 from formation_gnc.records import Event, EventKind, ParameterChange
 from formation_gnc.types import NANOSECONDS
@@ -125,7 +125,7 @@ class FlightModule[P: ModuleParameters, D](ABC):
                 latest = self._design_from(latest.parameters, changes)
                 plan.append((at, latest))
             elif entry not in self.parameters.schedule:
-                raise ConfigurationError(
+                raise ParameterError(
                     f"parameter schedule: {entry!r} is not allowed; its time must be above "
                     f"{over / NANOSECONDS:g} s, which is now"
                 )
@@ -214,17 +214,17 @@ class FlightModule[P: ModuleParameters, D](ABC):
 
 
 def scheduled(entry: str) -> tuple[int, dict[str, Any]]:
-    """Time (ns) and changes of one entry of a schedule; raises ConfigurationError when it cannot be read."""
+    """Time (ns) and changes of one entry of a schedule; raises ParameterError when it cannot be read."""
     try:
         changes = read_yaml(entry)
         at = round(float(changes.pop("at")) * NANOSECONDS)
     except (yaml.YAMLError, AttributeError, KeyError, TypeError, ValueError, OverflowError):
-        raise ConfigurationError(
+        raise ParameterError(
             f"parameter schedule: {entry!r} is not allowed; "
             "it must be like '{at: 3000.0, algorithm: coast}' with the time in seconds"
         ) from None
     if "schedule" in changes:
-        raise ConfigurationError(f"parameter schedule: {entry!r} is not allowed; it must not change itself")
+        raise ParameterError(f"parameter schedule: {entry!r} is not allowed; it must not change itself")
     return at, {str(name): value for name, value in changes.items()}
 
 

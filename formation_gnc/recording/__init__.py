@@ -1,5 +1,6 @@
 """Writing, reading and recovering MCAP bags."""
 
-from formation_gnc.recording.reader import Bag, identical, read
+from formation_gnc.recording.difference import Difference, identical
+from formation_gnc.recording.reader import Bag, read
 
-__all__ = ["Bag", "identical", "read"]
+__all__ = ["Bag", "Difference", "identical", "read"]

@@ -1,4 +1,4 @@
-"""Topics of a bag as files for other tools."""
+"""Topics of a bag as CSV and Parquet files."""
 
 import csv
 import json
@@ -15,13 +15,15 @@ from formation_gnc.recording.reader import Bag, columns
 def export(bag: Bag, topic: str, path: Path) -> None:
     """Write a topic to a .csv or .parquet file: a row per message, a column per field or array element.
 
-    Numbers keep every bit in both. Arrays whose length varies are one column: JSON in CSV, a list in Parquet.
-    Raises ConfigurationError for an unknown topic or file type, Parquet without pyarrow, or a path that
-    cannot be written.
+    Both keep every bit of a number. An array of varying length is one column: JSON in CSV, a list in Parquet.
+
+    Raises:
+        BagError: the bag has no such topic, or cannot be read.
+        ConfigurationError: the file type is unknown, pyarrow is not installed, or the path cannot be written.
     """
     writers = {".csv": _write_csv, ".parquet": _write_parquet}
     if path.suffix not in writers:
-        raise ConfigurationError(f"export to {path}: known file types are {' and '.join(writers)}")
+        raise ConfigurationError(f"export to {path} is not allowed; it must be a file of type {' or '.join(writers)}")
     table = columns(bag.arrays(topic))
     try:
         writers[path.suffix](table, path)

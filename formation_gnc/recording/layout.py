@@ -1,7 +1,7 @@
-"""The panels in which Foxglove shows a run, as a layout file that it imports."""
+"""Foxglove layout of a run: a file that Foxglove imports."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from formation_gnc.flight import topics
@@ -11,8 +11,6 @@ LAYOUT = "foxglove_layout.json"
 """File name of the layout among a bag's attachments."""
 
 AXES = ("x radial", "y along-track", "z cross-track")
-
-
 STATES = (
     (topics.STATUS, "algorithm"),
     (topics.STATUS, "fallback"),
@@ -23,66 +21,86 @@ STATES = (
 
 
 def foxglove_layout(deputies: Sequence[str]) -> str:
-    """A layout for a run of these deputies, JSON: a tab for each, and the events of the run beside them."""
-    panels: dict[str, Any] = {}
+    """Layout, JSON, for a run of these deputies: a tab for each, the events of the run beside them."""
+    panels = _Panels()
+    tabs = [{"title": name, "layout": _deputy_tab(panels, name)} for name in deputies]
+    first = panels.add("Tab", "deputies", activeTabIdx=0, tabs=tabs)
+    second = _run_column(panels)
+    layout = {
+        "configById": panels.settings,
+        "globalVariables": {},
+        "userNodes": {},
+        "playbackConfig": {"speed": 1.0},
+        "layout": {"direction": "row", "first": first, "second": second, "splitPercentage": 70},
+    }
+    return json.dumps(layout, indent=1) + "\n"
 
-    def panel(kind: str, name: str, **settings: Any) -> str:
-        panels[f"{kind}!{name}"] = settings
+
+class _Panels:
+    """Settings of all panels by id."""
+
+    def __init__(self) -> None:
+        self.settings: dict[str, Any] = {}
+
+    def add(self, kind: str, name: str, **settings: Any) -> str:
+        """Add a panel; returns its id."""
+        self.settings[f"{kind}!{name}"] = settings
         return f"{kind}!{name}"
 
-    def plot(name: str, title: str, series: dict[str, str], **settings: Any) -> str:
+    def add_plot(self, name: str, title: str, series: Mapping[str, str], **settings: Any) -> str:
+        """Add a plot of message paths by label; returns its id."""
         paths = [
             {"value": path, "label": label, "enabled": True, "timestampMethod": "headerStamp"}
             for label, path in series.items()
         ]
         shown = {"showLegend": True, "legendDisplay": "floating", "isSynced": True, "xAxisVal": "timestamp"}
-        return panel("Plot", name, foxglovePanelTitle=title, paths=paths, **(shown | settings))
+        return self.add("Plot", name, foxglovePanelTitle=title, paths=paths, **(shown | settings))
 
-    def by_axis(topic: str, first: int = 0) -> dict[str, str]:
-        return {axis: f"{topic}[{first + index}]" for index, axis in enumerate(AXES)}
 
-    def tab(name: str) -> dict[str, Any]:
-        truth = f'{topics.TRUTH.name}.deputies[:]{{name=="{name}"}}.relative_state'
-        path = plot(
-            f"{name}-path",
-            "Path in the Hill frame: radial over along-track [m]",
-            {"path": f"{truth}[0]"},
-            xAxisVal="custom",
-            xAxisPath={"value": f"{truth}[1]", "enabled": True},
-        )
-        state = plot(f"{name}-truth", "True relative position [m]", by_axis(truth))
-        estimate = plot(
-            f"{name}-estimate", "Estimated position [m]", by_axis(f"{topics.ESTIMATE.of(name)}.relative_state")
-        )
-        target = plot(f"{name}-target", "Target position [m]", by_axis(f"{topics.TARGET.of(name)}.relative_state"))
-        thrust = plot(f"{name}-thrust", "Thrust [N]", by_axis(f"{topics.THRUST.of(name)}.force"))
-        timing = plot(
-            f"{name}-timing",
-            "Compute time [s]",
-            {part: f'{topics.TIMING.of(name)}{{node=="{part}"}}.compute_time' for part in MODULES},
-        )
-        states = panel(
-            "StateTransitions",
-            f"{name}-states",
-            foxglovePanelTitle="Law, filter and shadow",
-            isSynced=True,
-            paths=[
-                {
-                    "value": f"{topic.of(name)}.{field}",
-                    "label": f"{topic.name}.{field}",
-                    "timestampMethod": "headerStamp",
-                }
-                for topic, field in STATES
-            ],
-        )
-        left = _stacked("column", [path, states])
-        return {
-            "title": name,
-            "layout": _stacked("row", [left, _stacked("column", [state, estimate, target, thrust, timing])]),
-        }
+def _by_axis(field: str) -> dict[str, str]:
+    """Message paths of the first three elements of a field, by label."""
+    return {axis: f"{field}[{index}]" for index, axis in enumerate(AXES)}
 
-    tabs = panel("Tab", "deputies", activeTabIdx=0, tabs=[tab(name) for name in deputies])
-    scene = panel(
+
+def _deputy_tab(panels: _Panels, name: str) -> Any:
+    """Path and states on the left, time plots on the right."""
+    truth = f'{topics.TRUTH.name}.deputies[:]{{name=="{name}"}}.relative_state'
+    path = panels.add_plot(
+        f"{name}-path",
+        "Path in the Hill frame: radial over along-track [m]",
+        {"path": f"{truth}[0]"},
+        xAxisVal="custom",
+        xAxisPath={"value": f"{truth}[1]", "enabled": True},
+    )
+    states = panels.add(
+        "StateTransitions",
+        f"{name}-states",
+        foxglovePanelTitle="Law, filter and shadow",
+        isSynced=True,
+        paths=[
+            {
+                "value": f"{topic.of(name)}.{field}",
+                "label": f"{topic.name}.{field}",
+                "timestampMethod": "headerStamp",
+            }
+            for topic, field in STATES
+        ],
+    )
+    vectors = {
+        "truth": ("True relative position [m]", truth),
+        "estimate": ("Estimated position [m]", f"{topics.ESTIMATE.of(name)}.relative_state"),
+        "target": ("Target position [m]", f"{topics.TARGET.of(name)}.relative_state"),
+        "thrust": ("Thrust [N]", f"{topics.THRUST.of(name)}.force"),
+    }
+    plots = [panels.add_plot(f"{name}-{key}", title, _by_axis(field)) for key, (title, field) in vectors.items()]
+    times = {module: f'{topics.TIMING.of(name)}{{node=="{module}"}}.compute_time' for module in MODULES}
+    plots.append(panels.add_plot(f"{name}-timing", "Compute time [s]", times))
+    return _stacked("row", [_stacked("column", [path, states]), _stacked("column", plots)])
+
+
+def _run_column(panels: _Panels) -> Any:
+    """Scene, state, events and log of the whole run."""
+    scene = panels.add(
         "3D",
         "scene",
         foxglovePanelTitle="Hill frame, drawn by the display node",
@@ -91,28 +109,19 @@ def foxglove_layout(deputies: Sequence[str]) -> str:
         topics={topics.MARKERS.name: {"visible": True}},
         cameraState={"distance": 2000.0, "phi": 60.0, "thetaOffset": 45.0, "perspective": True, "fovy": 45.0},
     )
-    events = panel("RawMessages", "events", foxglovePanelTitle="Events", topicPath=topics.EVENTS.name)
-    state_of_run = panel("DiagnosticSummary", "run", foxglovePanelTitle="Run", topicToRender=topics.DIAGNOSTICS.name)
-    said = panel("RosOut", "rosout", foxglovePanelTitle="What the nodes said")
-    side = _stacked("column", [scene, state_of_run, events, said])
-    layout = {
-        "configById": panels,
-        "globalVariables": {},
-        "userNodes": {},
-        "playbackConfig": {"speed": 1.0},
-        "layout": {"direction": "row", "first": tabs, "second": side, "splitPercentage": 70},
-    }
-    return json.dumps(layout, indent=1) + "\n"
+    state = panels.add("DiagnosticSummary", "run", foxglovePanelTitle="Run", topicToRender=topics.DIAGNOSTICS.name)
+    events = panels.add("RawMessages", "events", foxglovePanelTitle="Events", topicPath=topics.EVENTS.name)
+    log = panels.add("RosOut", "rosout", foxglovePanelTitle="Log of the nodes")
+    return _stacked("column", [scene, state, events, log])
 
 
-def _stacked(direction: str, items: list[Any]) -> Any:
-    """Items of the same size one after the other: a binary tree, as Foxglove splits space."""
+def _stacked(direction: str, items: Sequence[Any]) -> Any:
+    """Items of equal size in a row or column: a binary tree, as Foxglove splits space."""
     if len(items) == 1:
         return items[0]
-    rest = _stacked(direction, items[1:])
     return {
         "direction": direction,
         "first": items[0],
-        "second": rest,
+        "second": _stacked(direction, items[1:]),
         "splitPercentage": round(100.0 / len(items), 3),
     }

@@ -1,4 +1,4 @@
-"""One MCAP file, read chunk by chunk: through its index, or after one scan when it was never finished."""
+"""Reader of one MCAP file, chunk by chunk: by its index, or after a scan when it was never finished."""
 
 import struct
 import zlib
@@ -18,7 +18,7 @@ from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metada
 from mcap.stream_reader import StreamReader, get_chunk_data_stream
 from mcap.summary import Summary
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import BagError
 
 MAGIC = b"\x89MCAP0\r\n"
 UNREADABLE = (
@@ -31,7 +31,7 @@ UNREADABLE = (
     OverflowError,
     zstandard.ZstdError,
 )
-"""What the MCAP and compression libraries raise on damaged bytes."""
+"""Exceptions of the MCAP and compression libraries on damaged bytes."""
 
 _RECORD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
@@ -40,23 +40,28 @@ _FOOTER = struct.Struct("<BQQQI")
 
 @dataclass(frozen=True)
 class Span:
-    """A stretch of the file read as one: a chunk, or a whole file with messages outside chunks (offset None).
-
-    start, end: first and last stamp in it, ns.
-    """
+    """Part of a file that is read at once: a chunk, or a whole file with messages outside chunks."""
 
     offset: int | None
+    """Byte at which the chunk begins; None for the whole file."""
     start: int
+    """First stamp, ns."""
     end: int
+    """Last stamp, ns."""
 
 
 class McapFile:
     """Reader of one MCAP file in bounded memory.
 
-    schemas, channels: by id. counts: messages by channel id. spans: in file order. metadata and attachments:
-    by name, the last of each. damage: None for a finished file, else why it ends where it ends; what stands
-    before is read all the same.
-    Raises ConfigurationError when the file cannot be opened or is no MCAP, or a chunk turns out damaged.
+    Attributes:
+        schemas, channels: records by id.
+        counts: number of messages by channel id.
+        spans: in file order.
+        metadata, attachments: by name, the last of each.
+        damage: None for a finished file, else the reason why it ends early; everything before is read.
+
+    Raises:
+        BagError: the file cannot be opened or is no MCAP file, or, while reading, a chunk is damaged.
     """
 
     def __init__(self, path: Path) -> None:
@@ -71,17 +76,17 @@ class McapFile:
         self.damage: str | None = None
         with self._open() as stream:
             if stream.read(len(MAGIC)) != MAGIC:
-                raise ConfigurationError(f"{path}: is not an MCAP file")
+                raise BagError(f"{path}: is not an MCAP file")
             summary = verified_summary(stream)
             if summary is not None:
-                self._take(summary, stream)
+                self._read_index(summary, stream)
             else:
                 self._scan(stream)
 
     def messages(
         self, channels: Collection[int] | None = None, start_ns: int = 0, end_ns: int = 2**64
     ) -> Iterator[Message]:
-        """Messages of the channels (None: of all) with start_ns <= stamp < end_ns, in file order."""
+        """Messages of some channels (None: all) with start_ns <= stamp < end_ns, in file order."""
         for span in self.spans:
             if span.end >= start_ns and span.start < end_ns:
                 for message in self.span_messages(span):
@@ -100,7 +105,7 @@ class McapFile:
                 yield from (record for record in records if isinstance(record, Message))
             except UNREADABLE as error:
                 if self.damage is None or span.offset is not None:
-                    raise ConfigurationError(
+                    raise BagError(
                         f"{self.path}: damaged in the chunk at byte {span.offset} ({error}); recover it first"
                     ) from None
 
@@ -108,9 +113,9 @@ class McapFile:
         try:
             return self.path.open("rb")
         except OSError as error:
-            raise ConfigurationError(f"{self.path}: cannot be read: {error.strerror}") from None
+            raise BagError(f"{self.path}: cannot be read: {error.strerror}") from None
 
-    def _take(self, summary: Summary, stream: BinaryIO) -> None:
+    def _read_index(self, summary: Summary, stream: BinaryIO) -> None:
         self.schemas, self.channels = summary.schemas, summary.channels
         assert summary.statistics is not None
         self.counts.update(summary.statistics.channel_message_counts)
@@ -124,9 +129,7 @@ class McapFile:
             self.metadata = {record.name: record.metadata for record in reader.iter_metadata()}
             self.attachments = {record.name: record.data for record in reader.iter_attachments()}
         except UNREADABLE as error:
-            raise ConfigurationError(
-                f"{self.path}: metadata or attachments damaged ({error}); recover the bag first"
-            ) from None
+            raise BagError(f"{self.path}: metadata or attachments damaged ({error}); recover the bag first") from None
 
     def _scan(self, stream: BinaryIO) -> None:
         size = stream.seek(0, SEEK_END)
@@ -136,11 +139,11 @@ class McapFile:
         try:
             for record in StreamReader(stream, emit_chunks=True, record_size_limit=size).records:
                 if isinstance(record, Chunk):
-                    for inner in list(chunk_records(chunk_content(record))):
-                        self._note(inner)
+                    for inner in list(chunk_records(chunk_content(record))):  # all or none of a damaged one
+                        self._add(inner)
                     self.spans.append(Span(offset, record.message_start_time, record.message_end_time))
                 else:
-                    self._note(record)
+                    self._add(record)
                     if isinstance(record, Message):
                         first, last = min(first, record.log_time), max(last, record.log_time)
                 offset = stream.tell()
@@ -150,7 +153,7 @@ class McapFile:
             spans = [*self.spans, Span(None, first, last)]
             self.spans = [Span(None, min(span.start for span in spans), max(span.end for span in spans))]
 
-    def _note(self, record: McapRecord) -> None:
+    def _add(self, record: McapRecord) -> None:
         match record:
             case Message():
                 self.counts[record.channel_id] += 1
@@ -190,16 +193,16 @@ def verified_summary(stream: BinaryIO) -> Summary | None:
 
 
 def chunk_content(chunk: Chunk) -> bytes:
-    """Decompressed records of a chunk, its checksum verified. Raises one of UNREADABLE."""
+    """Decompressed records of a chunk after its checksum is verified; raises one of UNREADABLE."""
     stream, length = get_chunk_data_stream(chunk, validate_crc=True)
     return stream.read(length)
 
 
 def chunk_records(content: bytes) -> Iterator[Message | Schema | Channel]:
-    """Records of a decompressed chunk, in order. Raises one of UNREADABLE where a record is cut.
+    """Records of a decompressed chunk, in order; raises one of UNREADABLE at a truncated record.
 
-    Other than mcap's own `breakup_chunk` it holds one record at a time, tells a cut record from a whole one,
-    and takes a third of the time.
+    Unlike mcap's `breakup_chunk` it holds one record at a time, detects a truncated one, and takes a third of
+    the time.
     """
     offset, end = 0, len(content)
     while offset < end:
@@ -217,17 +220,18 @@ def chunk_records(content: bytes) -> Iterator[Message | Schema | Channel]:
 
 
 def mcap_files(path: Path) -> list[Path]:
-    """Files of a bag, a directory or a bare file, in the order of the number at the end of their names.
+    """Files of a bag (a directory or a single file) in order of the number at the end of their names.
 
-    Raises ConfigurationError when there is no such bag or its directory holds no .mcap file.
+    Raises:
+        BagError: there is no such bag, or its directory holds no .mcap file.
     """
     if path.is_dir():
         files = sorted(path.glob("*.mcap"), key=lambda file: (_number(file.stem), file.name))
         if not files:
-            raise ConfigurationError(f"{path}: holds no .mcap file")
+            raise BagError(f"{path}: holds no .mcap file")
         return files
     if not path.exists():
-        raise ConfigurationError(f"{path}: no such bag")
+        raise BagError(f"{path}: no such bag")
     return [path]
 
 

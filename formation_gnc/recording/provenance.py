@@ -1,4 +1,4 @@
-"""Where a log comes from: versions and commit, for its metadata."""
+"""Provenance of a bag: versions and commit, for its metadata."""
 
 import platform
 import subprocess
@@ -8,20 +8,24 @@ from pathlib import Path
 import formation_gnc
 
 LOST = "lost messages"
-"""Name of the metadata record that says how many messages of each topic a recorder knows to have missed."""
+"""Name of the metadata record with the number of lost messages by topic."""
+
 PACKAGES = ("numpy", "scipy", "numba", "filterpy", "osqp", "mcap")
+"""Packages on which the numbers of a run depend."""
 
 
 def parameters_record(node: str, start: int | None = None) -> str:
-    """Name of the metadata record with the parameters of a node, by its full name.
+    """Name of the metadata record with the parameters of a node.
 
-    start: stamp (ns) of its first answer, when it had been started again.
+    Args:
+        node: full name.
+        start: stamp (ns) of the first answer after a restart; None for the first start.
     """
     return f"parameters {node}" if start is None else f"parameters {node} from {start}"
 
 
 def provenance() -> dict[str, dict[str, str]]:
-    """Metadata records of a bag by name: what software flew, nothing of the machine it flew on."""
+    """Metadata records of a bag by name: versions of the software, nothing about the machine."""
     return {
         "versions": {
             "formation_gnc": formation_gnc.__version__,
@@ -33,7 +37,7 @@ def provenance() -> dict[str, dict[str, str]]:
 
 
 def commit() -> str:
-    """The git commit of the source tree, with `-dirty` when it has changes; `unknown` outside a checkout."""
+    """Git commit of the source tree, with `-dirty` when it has changes; `unknown` outside a checkout."""
     source = Path(formation_gnc.__file__).resolve().parent
     command = ["git", "-C", str(source), "describe", "--always", "--abbrev=40", "--dirty"]
     try:

@@ -1,4 +1,4 @@
-"""The bag writer: MCAP files and metadata.yaml as rosbag2 Jazzy lays them out."""
+"""Bag writer: MCAP files and metadata.yaml as rosbag2 Jazzy lays them out."""
 
 import os
 import time
@@ -8,106 +8,62 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from textwrap import indent
 from types import TracebackType
-from typing import Any, BinaryIO, NoReturn, Self
+from typing import BinaryIO, NoReturn, Self
 
 import yaml
 from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
 
 from formation_gnc import __version__
-from formation_gnc.errors import ConfigurationError
-from formation_gnc.recording.schema import schema_text, type_hash
+from formation_gnc.errors import BagError
+from formation_gnc.recording.bag_metadata import FileEntry, TopicEntry, bag_information
+from formation_gnc.recording.topic_definition import TopicDefinition
 
 CHUNK_BYTES = 1 << 20
 FLUSH_INTERVAL = 0.25
-"""Wall time in s after which a written message is on the disk; a timer that calls `flush` uses it too."""
+"""Longest wall time (s) between flushes to the disk while messages arrive."""
 
-_EMPTY_START = 2**63 - 1  # rosbag2's starting time of a bag without messages
-_Dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 _MEDIA_TYPES = {".yaml": "application/yaml", ".json": "application/json"}
-_INFINITE = "{sec: 9223372036, nsec: 854775807}"
-_OFFERED_QOS = f"""\
-- history: keep_last
-  depth: %d
-  reliability: reliable
-  durability: transient_local
-  deadline: {_INFINITE}
-  lifespan: {_INFINITE}
-  liveliness: automatic
-  liveliness_lease_duration: {_INFINITE}
-  avoid_ros_namespace_conventions: false
-"""
 
 
 @dataclass(frozen=True)
 class Split:
-    """When a bag goes on in a next file: past so many bytes of messages on disk, or s of simulated time."""
+    """Limits at which a bag continues in a next file; None for no limit."""
 
     max_bytes: int | None = None
+    """Bytes of messages on the disk."""
     max_duration: float | None = None
+    """Simulated time, s."""
 
     def __post_init__(self) -> None:
-        """Reject limits that no file can keep."""
+        """Reject limits that are not positive."""
         for name, value in (("max_bytes", self.max_bytes), ("max_duration", self.max_duration)):
             if value is not None and not value > 0:
-                raise ConfigurationError(f"split {name} = {value}: must be above 0")
-
-
-@dataclass(frozen=True)
-class TopicDefinition:
-    """What a bag says of a topic: its type, the type's definition and rosbag2's channel metadata."""
-
-    type_name: str
-    schema: bytes
-    schema_encoding: str = "ros2msg"
-    message_encoding: str = "cdr"
-    metadata: Mapping[str, str] = field(default_factory=dict)
-
-    @classmethod
-    def installed(cls, type_name: str, depth: int) -> Self:
-        """Definition from the installed message packages, offered reliable, transient-local, keep-last.
-
-        Raises ConfigurationError when the type is not installed or the depth is not positive.
-        """
-        if depth < 1:
-            raise ConfigurationError(f"queue depth {depth}: must be at least 1")
-        metadata = {"offered_qos_profiles": _OFFERED_QOS % depth, "topic_type_hash": type_hash(type_name)}
-        return cls(type_name, schema_text(type_name).encode(), metadata=metadata)
+                raise BagError(f"split {name} = {value} is not allowed; it must be above 0")
 
 
 @dataclass
-class _Topic:
-    definition: TopicDefinition
-    qos: Any
-    channel: int
-    count: int = 0
+class _OpenFile:
+    """The file that messages go to."""
 
-
-@dataclass
-class _File:
-    """One MCAP file of the bag, the bytes before its first message, and what metadata.yaml says of it."""
-
-    path: Path
     stream: BinaryIO
     mcap: Writer
-    overhead: int
+    entry: FileEntry
+    overhead: int = 0
+    """Bytes before the first message."""
     schemas: dict[str, int] = field(default_factory=dict)
-    count: int = 0
-    start: int = _EMPTY_START
-    end: int = 0
+    """Schema ids by message type."""
+    channels: dict[str, int] = field(default_factory=dict)
+    """Channel ids by topic."""
 
 
 class BagWriter:
-    """Writes a bag that rosbag2 Jazzy, Foxglove and Python's readers open unprepared.
+    """Writes a bag that rosbag2 Jazzy, Foxglove and Python's readers open as it is.
 
-    Messages keep the order they are written in, and are stamped with simulated time alone, so the same
-    run gives the same messages. At most FLUSH_INTERVAL of wall time is not yet on the disk while messages
-    arrive; call `flush` on a timer for the times when none do.
+    Messages keep the order in which they are written, and are stamped with simulated time alone: the same
+    run gives the same messages. Messages reach the disk within FLUSH_INTERVAL of wall time while others
+    follow; call `flush` on a timer for the times when none do.
 
-    directory: must not exist yet; holds `<name>_0.mcap` and so on, and `metadata.yaml`.
-    provenance: MCAP metadata records by name.
-    attachments: files carried in the bag, by file name.
-    Raises ConfigurationError when the directory exists or cannot be made. Every method raises OSError,
-    naming the file, when the disk fails; what was written before stays readable.
+    Every method raises OSError, naming the file, when the disk fails; what was written before stays readable.
     """
 
     def __init__(
@@ -117,102 +73,122 @@ class BagWriter:
         attachments: Mapping[str, bytes] | None = None,
         split: Split | None = None,
     ) -> None:
-        """Make the directory and start its first file."""
+        """Make the directory and start the first file.
+
+        Args:
+            directory: must not exist; will hold `<name>_0.mcap` and so on, and `metadata.yaml`.
+            provenance: MCAP metadata records by name.
+            attachments: files to carry in the bag, by file name.
+            split: when to continue in a next file.
+
+        Raises:
+            BagError: the directory exists or cannot be made.
+        """
         self.directory = Path(directory).absolute()
         self._metadata = {name: dict(values) for name, values in provenance.items()}
         self._attachments = dict(attachments or {})
         self._split = split
-        self._topics: dict[str, _Topic] = {}
-        self._files: list[_File] = []
+        self._topics: dict[str, TopicEntry] = {}
+        self._files: list[FileEntry] = []
         self._unwritten = False  # records that are not on the disk yet
         self._unlisted = False  # topics or files that metadata.yaml does not name yet
         self._closed = False
         try:
             self.directory.mkdir(parents=True)
         except FileExistsError:
-            raise ConfigurationError(
-                f"bag directory {self.directory}: exists already; name another or remove it"
-            ) from None
+            raise BagError(f"bag directory {self.directory}: exists already; name another or remove it") from None
         except OSError as error:
-            raise ConfigurationError(f"bag directory {self.directory}: cannot be made: {error.strerror}") from None
+            raise BagError(f"bag directory {self.directory}: cannot be made: {error.strerror}") from None
         with self._guarded():
             self._start_file()
 
     def add_topic(self, topic: str, type_name: str, depth: int) -> None:
-        """Add a topic of an installed message type, offered with the project's QoS at this queue depth.
+        """Add a topic of an installed message type, with the project's QoS at this queue depth.
 
-        Raises ConfigurationError when the type is not installed or the topic was added before.
+        Raises:
+            BagError: the type is not installed, or the topic was added before.
         """
         self.add_defined_topic(topic, TopicDefinition.installed(type_name, depth))
 
     def add_defined_topic(self, topic: str, definition: TopicDefinition) -> None:
-        """Add a topic with a definition of its own, such as one read from another bag."""
+        """Add a topic with a given definition, such as one read from another bag.
+
+        Raises:
+            BagError: the topic was added before.
+        """
         if topic in self._topics:
-            raise ConfigurationError(f"topic {topic!r}: is already in the bag {self.directory}")
+            raise BagError(f"topic {topic!r}: already in the bag {self.directory}")
         qos = yaml.safe_load(definition.metadata.get("offered_qos_profiles", "[]"))
         with self._guarded():
-            self._topics[topic] = _Topic(definition, qos, self._register(topic, definition))
+            self._register(topic, definition)
+        self._topics[topic] = TopicEntry(definition, qos)
         self._unwritten = self._unlisted = True
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """Add an MCAP metadata record, such as the counters of the run before `close`."""
+        """Add an MCAP metadata record, such as the counters of a run at its end."""
         self._metadata[name] = dict(values)
         with self._guarded():
             self._file.mcap.add_metadata(name, self._metadata[name])
         self._unwritten = True
 
     def add_attachment(self, name: str, data: bytes) -> None:
-        """Add a file to be carried in the bag."""
+        """Add a file to carry in the bag."""
         self._attachments[name] = data
         with self._guarded():
             self._attach(name)
         self._unwritten = True
 
     def begin_file(self) -> None:
-        """Let the bag go on in a next file, unless the last one has no message yet."""
-        if self._file.count:
+        """Continue in a next file, unless the current one has no message yet."""
+        if self._file.entry.count:
             with self._guarded():
                 self._finish_file()
                 self._start_file()
 
     def write(self, topic: str, data: bytes, stamp_ns: int, sequence: int) -> None:
-        """Append one serialised message.
+        """Append one serialized message.
 
-        data: its CDR bytes as they came. stamp_ns: simulated time in ns, not negative. sequence: the
-        publisher's count, of which the file keeps the lower 32 bits.
-        Raises ConfigurationError when the stamp is negative, the topic was not added or the bag is closed.
+        Args:
+            topic: one that was added.
+            data: CDR bytes.
+            stamp_ns: simulated time, ns, not negative.
+            sequence: the publisher's count; the file keeps its lower 32 bits.
+
+        Raises:
+            BagError: the stamp is negative, the topic was not added, or the bag is closed.
         """
         try:
-            entry = self._topics[topic]
+            topic_entry = self._topics[topic]
         except KeyError:
-            raise ConfigurationError(f"topic {topic!r}: was not added, or the bag is closed") from None
+            raise BagError(f"topic {topic!r}: was not added, or the bag is closed") from None
         if stamp_ns < 0:
-            raise ConfigurationError(f"topic {topic!r}: stamp {stamp_ns} ns: must not be negative")
+            raise BagError(f"topic {topic!r}: stamp {stamp_ns} ns is not allowed; it must be at least 0")
         if self._split is not None and self._is_full(self._split, stamp_ns):
             self.begin_file()
         file = self._file
         try:
-            file.mcap.add_message(entry.channel, stamp_ns, data, stamp_ns, sequence & 0xFFFFFFFF)
+            file.mcap.add_message(file.channels[topic], stamp_ns, data, stamp_ns, sequence & 0xFFFFFFFF)
         except OSError as error:  # not `_guarded`: this is the hot path
             self._fail(error)
         self._unwritten = True
+        topic_entry.count += 1
+        entry = file.entry
         entry.count += 1
-        file.count += 1
-        if stamp_ns < file.start:
-            file.start = stamp_ns
-        if stamp_ns > file.end:
-            file.end = stamp_ns
+        if stamp_ns < entry.start:
+            entry.start = stamp_ns
+        if stamp_ns > entry.end:
+            entry.end = stamp_ns
         if time.monotonic() > self._flush_due:
             self.flush()
 
     def flush(self) -> None:
-        """Bring everything written so far to the disk, where a power cut does not reach it."""
+        """Write everything to the disk, safe from a power cut."""
         if not self._closed:
             with self._guarded():
                 self._flush()
 
     def close(self) -> None:
-        """Finish the bag: its index, its summary and metadata.yaml. Closing twice does no harm."""
+        """Finish the bag: index, summary and metadata.yaml. Does nothing the second time."""
         if not self._closed:
             with self._guarded():
                 self._finish_file()
@@ -221,31 +197,31 @@ class BagWriter:
             self._topics.clear()
 
     def __enter__(self) -> Self:
-        """Use as a context manager, closed at the end of the block."""
+        """Enter a block at whose end the bag is closed."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Close the bag, also when the block failed."""
+        """Close the bag, also after an error in the block."""
         self.close()
 
     def _start_file(self) -> None:
-        path = self.directory / f"{self.directory.name}_{len(self._files)}.mcap"
-        stream = path.open("xb")
+        entry = FileEntry(f"{self.directory.name}_{len(self._files)}.mcap")
+        stream = (self.directory / entry.name).open("xb")
         limit = self._split.max_bytes if self._split is not None else None
         chunk_bytes = CHUNK_BYTES if limit is None else min(CHUNK_BYTES, limit)
         mcap = Writer(stream, chunk_size=chunk_bytes, compression=CompressionType.ZSTD, enable_data_crcs=True)
         mcap.start(profile="ros2", library=f"formation_gnc {__version__}, {LIBRARY_IDENTIFIER}")
         for name, values in self._metadata.items():
             mcap.add_metadata(name, values)
-        self._file = _File(path, stream, mcap, overhead=0)
+        self._file = _OpenFile(stream, mcap, entry)
         for name in self._attachments:
             self._attach(name)
         self._file.overhead = stream.tell()
-        self._files.append(self._file)
-        for topic, entry in self._topics.items():
-            entry.channel = self._register(topic, entry.definition)
+        self._files.append(entry)
+        for topic, known in self._topics.items():
+            self._register(topic, known.definition)
         self._unwritten = self._unlisted = True
         self._flush()
 
@@ -255,17 +231,19 @@ class BagWriter:
             create_time=0, log_time=0, name=name, media_type=media_type, data=self._attachments[name]
         )
 
-    def _register(self, topic: str, definition: TopicDefinition) -> int:
+    def _register(self, topic: str, definition: TopicDefinition) -> None:
+        """Give the topic a channel in the current file."""
         file = self._file
         schema = file.schemas.get(definition.type_name)
         if schema is None:
             schema = file.mcap.register_schema(definition.type_name, definition.schema_encoding, definition.schema)
             file.schemas[definition.type_name] = schema
-        return file.mcap.register_channel(topic, definition.message_encoding, schema, dict(definition.metadata))
+        metadata = dict(definition.metadata)
+        file.channels[topic] = file.mcap.register_channel(topic, definition.message_encoding, schema, metadata)
 
     def _is_full(self, split: Split, stamp_ns: int) -> bool:
         file = self._file
-        if split.max_duration is not None and stamp_ns - file.start >= split.max_duration * 1e9:
+        if split.max_duration is not None and stamp_ns - file.entry.start >= split.max_duration * 1e9:
             return True
         return split.max_bytes is not None and file.stream.tell() - file.overhead >= split.max_bytes
 
@@ -280,49 +258,18 @@ class BagWriter:
 
     def _finish_file(self) -> None:
         file = self._file
-        file.mcap.add_metadata("rosbag2", {"serialized_metadata": self._information()})
+        file.mcap.add_metadata("rosbag2", {"serialized_metadata": bag_information(self._topics, self._files)})
         file.mcap.finish()  # type: ignore[no-untyped-call]
         file.stream.flush()
         os.fdatasync(file.stream.fileno())
         file.stream.close()
 
     def _write_metadata(self) -> None:
-        """Replace metadata.yaml in one step, so that it is whole at any moment."""
+        """Replace metadata.yaml atomically."""
         partial = self.directory / "metadata.yaml.partial"
-        text = "rosbag2_bagfile_information:\n" + indent(self._information(), "  ")
+        text = "rosbag2_bagfile_information:\n" + indent(bag_information(self._topics, self._files), "  ")
         partial.write_text(text, encoding="utf-8")
         partial.replace(self.directory / "metadata.yaml")
-
-    def _information(self) -> str:
-        """The bag's description in rosbag2's YAML."""
-        topics = [
-            {
-                "topic_metadata": {
-                    "name": name,
-                    "type": entry.definition.type_name,
-                    "serialization_format": entry.definition.message_encoding,
-                    "offered_qos_profiles": entry.qos,
-                    "type_description_hash": entry.definition.metadata.get("topic_type_hash", ""),
-                },
-                "message_count": entry.count,
-            }
-            for name, entry in self._topics.items()
-        ]
-        files = [{"path": file.path.name, **_span([file]), "message_count": file.count} for file in self._files]
-        information = {
-            "version": 9,
-            "storage_identifier": "mcap",
-            **_span(self._files),
-            "message_count": sum(file.count for file in self._files),
-            "topics_with_message_count": topics,
-            "compression_format": "",  # of whole files: MCAP compresses its chunks by itself
-            "compression_mode": "",
-            "relative_file_paths": [file.path.name for file in self._files],
-            "files": files,
-            "custom_data": None,
-            "ros_distro": "jazzy",
-        }
-        return str(yaml.dump(information, Dumper=_Dumper, sort_keys=False))
 
     @contextmanager
     def _guarded(self) -> Iterator[None]:
@@ -332,7 +279,7 @@ class BagWriter:
             self._fail(error)
 
     def _fail(self, error: OSError) -> NoReturn:
-        """End the bag where it stands: what is on the disk is left for `recover`."""
+        """Abandon the bag; `recover` saves what is on the disk."""
         self._closed = True
         self._topics.clear()
         with suppress(OSError):
@@ -342,12 +289,3 @@ class BagWriter:
             f"bag cut short: {error.strerror}; `recover` saves what was written",
             str(self.directory),
         ) from error
-
-
-def _span(files: list[_File]) -> dict[str, dict[str, int]]:
-    start = min(file.start for file in files)
-    end = max(file.end for file in files)
-    return {
-        "starting_time": {"nanoseconds_since_epoch": start},
-        "duration": {"nanoseconds": max(end - start, 0)},
-    }

@@ -9,7 +9,7 @@ from rclpy.task import Future
 
 from formation_gnc.flight import topics
 from formation_gnc.recording.live import LiveView
-from formation_gnc.recording.writer import TopicDefinition
+from formation_gnc.recording.topic_definition import TopicDefinition
 from formation_gnc.transport.node import Executor
 from formation_gnc.transport.raw_topics import Callback, RawTopics
 
@@ -31,7 +31,7 @@ def show_graph(view: LiveView, ended: Callable[[], bool]) -> None:
 
         def show(data: bytes, stamp: int, _number: int | None) -> None:
             if is_clock:
-                view.tell_time(stamp)
+                view.broadcast_time(stamp)
             view.show(topic, data, stamp)
 
         return show

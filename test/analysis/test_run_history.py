@@ -1,14 +1,15 @@
-"""A run read once and thinned is the run read whole."""
+"""A run that is read once and thinned equals the run read as a whole."""
 
-from pathlib import Path
+import math
 
 import numpy as np
 import pytest
 
 from formation_gnc.analysis.metrics import deputies_of, figures, trajectory
-from formation_gnc.analysis.overview import draw_overview, draw_panels
-from formation_gnc.analysis.run_history import Mark, RunHistory
+from formation_gnc.analysis.run_history import RunHistory
 from formation_gnc.analysis.separation import minimum_separation
+from formation_gnc.analysis.thinning import POINTS, Thinned
+from formation_gnc.analysis.timeline import Mark
 from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.sil.runner import Run
@@ -18,7 +19,7 @@ from formation_gnc.transport.in_process_recorder import InProcessRecorder
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Bag:
-    directory = tmp_path_factory.mktemp("flown") / "bag"
+    directory = tmp_path_factory.mktemp("history") / "bag"
     overrides = {"/plant": {"duration": 250.0}, "/**/guidance": {"schedule": []}}
     overrides["/**/controller"] = {"schedule": ["{at: 50.0, algorithm: coast}"]}
     with BagWriter(directory, {}) as writer:
@@ -27,30 +28,37 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Bag:
 
 
 @pytest.fixture(scope="module")
-def flown(bag: Bag) -> RunHistory:
+def history(bag: Bag) -> RunHistory:
     return RunHistory(bag)
 
 
-def test_a_short_run_is_all_there(bag: Bag, flown: RunHistory) -> None:
+def test_a_short_run_is_complete(bag: Bag, history: RunHistory) -> None:
     whole = figures(bag)
-    for name, deputy in flown.deputies.items():
-        read = trajectory(bag, name)
-        assert np.array_equal(deputy.truth, read.truth)
-        assert np.array_equal(deputy.error, read.estimation_error)
-        assert np.array_equal(deputy.control[:, :3], read.error)
-        assert np.array_equal(deputy.sigma, read.sigma)
-        assert np.array_equal(deputy.acceleration[1:], read.applied)
-        # another order of adding up
-        assert deputy.spent == pytest.approx(whole.deputies[name].delta_v_m_s, rel=1e-12)
-        assert {sensor: len(rows) for sensor, rows in deputy.readings.items()} == dict.fromkeys(deputy.readings, 25)
+    for name, deputy in history.deputies.items():
+        path = trajectory(bag, name)
+        assert np.array_equal(deputy.truth, path.truth)
+        assert np.array_equal(deputy.estimation_error, path.estimation_error)
+        assert np.array_equal(deputy.control_error[:, :3], path.error)
+        assert np.array_equal(deputy.sigma, path.sigma)
+        assert np.array_equal(deputy.acceleration[1:], path.applied)
+        # another order of summation
+        assert deputy.total_delta_v == pytest.approx(whole.deputies[name].delta_v_m_s, rel=1e-12)
+        assert {channel: len(rows) for channel, rows in deputy.readings.items()} == {
+            ("radius", 0): 25,
+            ("range_rate", 0): 25,
+            ("latitude", 0): 25,
+        }
+
+
+def test_nearest_approach_is_that_of_all_pairs(bag: Bag, history: RunHistory) -> None:
     truth, names = bag.arrays("/truth"), deputies_of(bag)
-    places = [truth[f"deputies.{index}.relative_state"][:, :3] for index in range(len(names))]
-    assert flown.nearest == minimum_separation(truth["time"], np.array(places), names)
-    assert len(flown.distances) == 6
-    assert min(rows[:, 1].min() for rows in flown.distances.values()) == flown.nearest.distance
+    positions = [truth[f"deputies.{index}.relative_state"][:, :3] for index in range(len(names))]
+    assert history.nearest == minimum_separation(truth["time"], np.array(positions), names)
+    assert len(history.distances) == 6
+    assert min(rows[:, 1].min() for rows in history.distances.values()) == history.nearest.distance
 
 
-def test_batches_of_all_topics_are_those_of_each(bag: Bag) -> None:
+def test_batches_of_several_topics_equal_those_of_each(bag: Bag) -> None:
     topics = ["/truth", "/deputy2/estimate", "/events"]
     read: dict[str, list[np.ndarray]] = {topic: [] for topic in topics}
     for topic, batch in bag.batches(topics, size=64):
@@ -60,18 +68,22 @@ def test_batches_of_all_topics_are_those_of_each(bag: Bag) -> None:
         assert np.concatenate(stamps).tolist() == bag.arrays(topic)["stamp_ns"].tolist()
 
 
-def test_an_event_concerns_its_deputy_or_everybody(flown: RunHistory) -> None:
-    swaps = [mark for mark in flown.events_of("deputy2") if mark.kind == "parameters"]
-    assert [mark.node for mark in swaps] == ["/deputy2/controller"]
-    flown.events.append(Mark(0.1, "miss", "/plant", "deputy1", "no answer: no thrust"))
-    flown.events.append(Mark(0.1, "new", "/fleet", "", "a kind that nobody foresaw"))
-    kinds = {name: {mark.kind for mark in flown.events_of(name)} for name in flown.deputies}
+def test_an_event_concerns_its_deputy_or_all(history: RunHistory) -> None:
+    changes = [mark for mark in history.timeline_of("deputy2").events if mark.kind == "parameters"]
+    assert [mark.node for mark in changes] == ["/deputy2/controller"]
+    history.events.append(Mark(0.1, "miss", "/plant", "deputy1", "no answer: no thrust"))
+    history.events.append(Mark(0.1, "new", "/fleet", "", "an unknown kind of event"))
+    kinds = {name: {mark.kind for mark in history.timeline_of(name).events} for name in history.deputies}
     assert "miss" in kinds["deputy1"]
     assert "miss" not in kinds["deputy2"]
     assert all({"new", "end"} <= each for each in kinds.values())
 
 
-def test_pictures_of_a_fleet_and_of_each_panel(flown: RunHistory, tmp_path: Path) -> None:
-    pictures = [draw_overview(flown, tmp_path / "overview.png", "four"), *draw_panels(flown, tmp_path)]
-    assert len(pictures) == 1 + 4 * 4
-    assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in pictures)
+def test_a_thinned_curve_has_bounded_length_and_even_steps() -> None:
+    thinned = Thinned(1)
+    for start in range(0, 50_000, 777):
+        thinned.add(np.arange(start, start + 777, dtype=float)[:, None])
+        assert len(thinned.rows) <= 2 * POINTS
+    steps = np.unique(np.diff(thinned.rows[:, 0]))
+    assert len(steps) == 1
+    assert math.log2(steps[0]).is_integer()

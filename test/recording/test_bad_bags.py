@@ -13,7 +13,8 @@ from mcap.writer import Writer
 
 from formation_gnc.cli import main
 from formation_gnc.recording import Bag
-from formation_gnc.recording.writer import BagWriter, TopicDefinition
+from formation_gnc.recording.topic_definition import TopicDefinition
+from formation_gnc.recording.writer import BagWriter
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
 from formation_gnc.transport.in_process_recorder import InProcessRecorder

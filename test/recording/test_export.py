@@ -44,7 +44,7 @@ def test_parquet_keeps_numbers_text_and_ragged_arrays(bag_path, tmp_path) -> Non
 
 def test_what_cannot_be_exported_is_said(bag_path, tmp_path) -> None:
     bag = Bag(bag_path)
-    with pytest.raises(ConfigurationError, match=r"\.csv and \.parquet"):
+    with pytest.raises(ConfigurationError, match=r"\.csv or \.parquet"):
         export(bag, "/clock", tmp_path / "clock.xls")
     with pytest.raises(ConfigurationError, match=r"nowhere/clock.csv: No such file"):
         export(bag, "/clock", tmp_path / "nowhere" / "clock.csv")

@@ -8,7 +8,7 @@ import pytest
 from foxglove.websocket import PlaybackCommand
 
 from formation_gnc.recording import Bag
-from formation_gnc.recording.live import Player
+from formation_gnc.recording.live_player import LivePlayer
 from formation_gnc.recording.writer import BagWriter
 
 
@@ -18,7 +18,7 @@ def test_a_bag_is_played_to_its_end_whatever_speed_a_viewer_asks_for(tmp_path: P
         writer.add_topic("/clock", "rosgraph_msgs/msg/Clock", depth=10)
         for second in (1, 2, 3):
             writer.write("/clock", flight[0].data, second * 10**9, second)
-    player = Player(Bag(tmp_path / "run"), 0, None, 200.0)
+    player = LivePlayer(Bag(tmp_path / "run"), 0, None, 200.0)
     try:
         asked = SimpleNamespace(
             playback_command=PlaybackCommand.Play, playback_speed=speed, seek_time=None, request_id="1"

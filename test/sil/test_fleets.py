@@ -10,7 +10,7 @@ import yaml
 from formation_gnc.analysis.compare import gnc_topics
 from formation_gnc.analysis.separation import minimum_separation
 from formation_gnc.cli import main
-from formation_gnc.recording.reader import Bag, identical
+from formation_gnc.recording import Bag, identical
 from formation_gnc.records import Event, EventKind, Truth
 from formation_gnc.sil.plant_executive import Report
 from formation_gnc.sil.runner import Run

@@ -16,7 +16,7 @@ import yaml
 
 from formation_gnc.cli import main
 from formation_gnc.control.registry import ALGORITHMS
-from formation_gnc.recording.reader import Bag, identical
+from formation_gnc.recording import Bag, identical
 from formation_gnc.records import EventKind
 
 from .conftest import GNC_TOPICS, PARTS, PATIENCE, Desk, Sil, set_parameter, wait_until

@@ -16,7 +16,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from formation_gnc.analysis.compare import gnc_topics
 from formation_gnc.cli import main
-from formation_gnc.recording.reader import Bag, identical
+from formation_gnc.recording import Bag, identical
 from formation_gnc.records import EventKind
 from formation_gnc.sil.scenario import find_scenario
 

@@ -1,0 +1,153 @@
+"""History of one deputy of a recorded run."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from formation_gnc.analysis.sensor_series import Channel, SensorSeries
+from formation_gnc.analysis.thinning import Thinned, ThinnedByKey, TickSelection
+from formation_gnc.recording.decode import nanoseconds
+from formation_gnc.recording.reader import Fields
+from formation_gnc.types import Matrix, Vector
+
+HOUR = 3600.0
+
+ECLIPSES = 300
+"""Eclipses kept at most."""
+
+
+class DeputyHistory:
+    """Curves of one deputy, thinned while they are read; times in h.
+
+    Attributes:
+        name: of the deputy.
+        time: (N,) selected ticks with truth.
+        truth: (N, 6) relative states at `time`.
+        acceleration: (N, 3) by thrust, over the tick before, m/s^2.
+        delta_v: (N,) so far, all axes added, m/s.
+        total_delta_v: over all ticks, m/s.
+        target: (L, 6) target states at the selected ticks that have one.
+        control_error, control_time: (P, 6) truth minus target, where a selected tick has both.
+        estimation_error, estimation_time: (M, 6) estimate minus truth, where a selected tick has both.
+        sigma, sigma_time: (K, 6) standard deviations of the filter.
+        eclipses: begin and end of each.
+        readings: (n, 2) time and value by sensor and component.
+        innovations: (n, 3) time, value and standard deviation by sensor and component.
+        timing: (n, 2) time and compute time (ms) by module.
+        solver: (n, 2) time and iterations.
+    """
+
+    def __init__(self, index: int, name: str, selection: TickSelection) -> None:
+        """Start empty.
+
+        Args:
+            index: place of the deputy in Truth.
+            name: of the deputy.
+            selection: of the ticks to keep.
+        """
+        self.name, self._selection = name, selection
+        self._prefix = f"deputies.{index}."
+        self._truth = _Columns("relative_state", "acceleration", "delta_v")
+        self._estimate, self._target = _Columns("relative_state", "covariance"), _Columns("relative_state")
+        self._readings, self._innovations = SensorSeries.of_readings(), SensorSeries.of_innovations()
+        self._timing, self._solver = ThinnedByKey[str](2), Thinned(2)
+        self.total_delta_v, self._in_eclipse = 0.0, False
+        self.eclipses: list[list[float]] = []
+        self.handlers: dict[str, Callable[[Fields], None]] = {
+            "estimate": self._add_estimate,
+            "target": self._add_target,
+            "measurement": self._readings.add,
+            "status": self._add_status,
+            "timing": self._add_timing,
+        }
+        """Takes the next batch of messages, by topic."""
+
+    def add_truth(self, batch: Fields) -> None:
+        """Take the next batch of truths."""
+        acceleration = batch[f"{self._prefix}applied_force"] / batch[f"{self._prefix}mass"][:, None]
+        steps = np.abs(acceleration).sum(axis=1) * self._selection.tick_ns * 1e-9
+        total = self.total_delta_v + np.cumsum(steps)
+        self.total_delta_v = float(total[-1])
+        columns = {
+            "stamp_ns": batch["stamp_ns"],
+            "relative_state": batch[f"{self._prefix}relative_state"],
+            "acceleration": acceleration,
+            "delta_v": total,
+        }
+        self._truth.add(columns, self._selection(batch["stamp_ns"]))
+        self._add_eclipses(batch["time"] / HOUR, batch[f"{self._prefix}eclipse"].astype(bool))
+
+    def _add_eclipses(self, time: Vector, eclipse: NDArray[np.bool_]) -> None:
+        state = np.concatenate(([self._in_eclipse], eclipse))
+        for row in np.flatnonzero(state[1:] != state[:-1]):
+            if state[row + 1]:
+                self.eclipses.append([float(time[row]), np.inf])
+            else:
+                self.eclipses[-1][1] = float(time[row])
+        del self.eclipses[ECLIPSES:-1]
+        self._in_eclipse = bool(state[-1])
+
+    def _add_estimate(self, batch: Fields) -> None:
+        self._estimate.add(batch, self._selection(batch["stamp_ns"]))
+        self._innovations.add(batch)
+
+    def _add_target(self, batch: Fields) -> None:
+        self._target.add(batch, self._selection(batch["stamp_ns"]))
+
+    def _add_status(self, batch: Fields) -> None:
+        self._solver.add(np.column_stack((batch["time"] / HOUR, batch["iterations"])))
+
+    def _add_timing(self, batch: Fields) -> None:
+        for module in np.unique(batch["node"].astype(str)):
+            own = batch["node"] == module
+            rows = np.column_stack((batch["time"][own] / HOUR, 1e-6 * nanoseconds(batch, "compute_time")[own]))
+            self._timing.add(str(module), rows)
+
+    def finish(self, end: float) -> None:
+        """Derive the curves after the last batch.
+
+        Args:
+            end: of the run, h.
+        """
+        for eclipse in self.eclipses:
+            eclipse[1] = min(eclipse[1], end)
+        stamps = self._truth["stamp_ns"]
+        self.time: Vector = stamps / 3.6e12
+        self.truth: Matrix = self._truth["relative_state"]
+        self.acceleration: Matrix = self._truth["acceleration"]
+        self.delta_v: Vector = self._truth["delta_v"]
+        self.estimation_error, self.estimation_time = self._minus_truth(stamps, self._estimate)
+        negative, self.control_time = self._minus_truth(stamps, self._target)
+        self.control_error: Matrix = -negative
+        covariance = self._estimate["covariance"].reshape(-1, 6, 6)
+        self.sigma: Matrix = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+        self.sigma_time: Vector = self._estimate["stamp_ns"] / 3.6e12
+        self.target: Matrix = self._target["relative_state"].reshape(-1, 6)
+        self.readings: dict[Channel, Matrix] = self._readings.rows
+        self.innovations: dict[Channel, Matrix] = self._innovations.rows
+        self.timing: dict[str, Matrix] = self._timing.rows
+        self.solver: Matrix = self._solver.rows
+
+    def _minus_truth(self, stamps: NDArray[np.int64], other: "_Columns") -> tuple[Matrix, Vector]:
+        """Relative states of `other` minus the truth, and their times."""
+        common, rows, others = np.intersect1d(stamps, other["stamp_ns"], return_indices=True)
+        if not len(common):
+            return np.zeros((0, 6)), np.zeros(0)
+        return other["relative_state"][others] - self.truth[rows], common / 3.6e12
+
+
+class _Columns:
+    """Selected rows of some fields, collected batch by batch."""
+
+    def __init__(self, *fields: str) -> None:
+        self._parts: dict[str, list[NDArray[Any]]] = {name: [] for name in ("stamp_ns", *fields)}
+
+    def add(self, columns: Mapping[str, NDArray[Any]], rows: NDArray[np.bool_]) -> None:
+        for name, part in self._parts.items():
+            part.append(columns[name][rows])
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        part = self._parts[name]
+        return np.concatenate(part) if part else np.zeros(0)

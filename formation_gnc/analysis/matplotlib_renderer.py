@@ -1,0 +1,60 @@
+"""Plots drawn with Matplotlib, for pictures."""
+
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from formation_gnc.analysis.plot import Axis, Curve, Plot, Style
+
+_LINES = {"solid": "-", "dashed": "--", "dotted": ":", "none": ""}
+_MARKERS = {"none": "", "dot": "o", "star": "*", "diamond": "D"}
+
+
+def draw(figure: Figure, place: Any, plot: Plot) -> None:
+    """Draw a plot at a place of a figure, a `SubplotSpec`."""
+    axes: Any = figure.add_subplot(place, projection="3d" if plot.z else None)
+    right = axes.twinx() if plot.right else None
+    handles: dict[str, Any] = {}
+    for curve in plot.curves:
+        if len(curve.x):
+            (handle,) = (right if curve.right and right else axes).plot(*_data(curve), **_look(curve.style))
+            handles.setdefault(curve.label, handle)
+    for track in plot.tracks:
+        (handles[track.label],) = axes.plot(*track.position[-1:].T, **_look(track.style))
+    axes.set(title=plot.title)
+    _set_axis(axes, "x", plot.x)
+    _set_axis(axes, "y", plot.y)
+    if plot.z:
+        _set_axis(axes, "z", plot.z)
+    if plot.equal:
+        axes.axis("equal")
+    if right and plot.right:
+        _set_axis(right, "y", plot.right)
+    if handles:
+        axes.legend(handles.values(), handles.keys(), loc="best", fontsize="small")
+    axes.grid(alpha=0.3)
+
+
+def _data(curve: Curve) -> tuple[Any, ...]:
+    return (curve.x, curve.y) if curve.z is None else (curve.x, curve.y, curve.z)
+
+
+def _look(style: Style) -> dict[str, Any]:
+    return {
+        "color": style.colour,
+        "linestyle": _LINES[style.line],
+        "linewidth": style.width,
+        "marker": _MARKERS[style.marker],
+        "markersize": style.size,
+    }
+
+
+def _set_axis(axes: Any, name: str, axis: Axis) -> None:
+    """Set title, scale, limit and direction of the axis of a name: x, y or z."""
+    axes.set(**{f"{name}label": axis.title})
+    if axis.log:
+        axes.set(**{f"{name}scale": "log"})
+    if axis.lower_limit is not None:
+        getattr(axes, f"set_{name}lim")(axis.lower_limit, None)
+    if axis.reversed:
+        getattr(axes, f"invert_{name}axis")()

@@ -1,0 +1,22 @@
+"""Readings of the sensors."""
+
+from formation_gnc.analysis.deputy_history import DeputyHistory
+from formation_gnc.analysis.panels.panel import MEASUREMENTS, DeputyPanel
+from formation_gnc.analysis.panels.sensors import components, sensor_colours, sensor_words
+from formation_gnc.analysis.plot import TIME, Axis, Curve, Plot, Style
+
+
+def plots(deputy: DeputyHistory) -> list[Plot]:
+    """A plot for each sensor that has readings or innovations."""
+    result = []
+    for sensor, colour in sensor_colours(deputy).items():
+        words, name = sensor_words(sensor), sensor.replace("_", " ")
+        curves = [
+            Curve(label, rows[:, 0], words.scale * rows[:, 1], Style(colour, "none", marker="dot"))
+            for label, rows in components(deputy.readings, sensor).items()
+        ]
+        result.append(Plot(name, TIME, Axis(name, words.unit), curves))
+    return result
+
+
+READINGS = DeputyPanel("readings", plots, MEASUREMENTS, in_overview=False)

@@ -1,0 +1,67 @@
+"""Curves of bounded length from runs of any length."""
+
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from formation_gnc.recording.reader import Bag
+from formation_gnc.types import Matrix
+
+POINTS = 2000
+"""Points of a drawn curve; at most twice as many."""
+
+
+class Thinned:
+    """Every n-th of the rows added, n doubling such that there are never more than 2 POINTS."""
+
+    def __init__(self, width: int) -> None:
+        """Start without rows of `width` numbers."""
+        self.rows: Matrix = np.empty((0, width))
+        self._stride, self._seen = 1, 0
+
+    def add(self, rows: Matrix) -> None:
+        """Add the next rows, (N, width)."""
+        index = np.arange(self._seen, self._seen + len(rows))
+        self._seen += len(rows)
+        self.rows = np.concatenate((self.rows, rows[index % self._stride == 0]))
+        while len(self.rows) > 2 * POINTS:
+            self.rows = self.rows[::2]
+            self._stride *= 2
+
+
+class ThinnedByKey[K]:
+    """Thinned rows for each key that occurs."""
+
+    def __init__(self, width: int) -> None:
+        """Start without keys."""
+        self._width = width
+        self._series: dict[K, Thinned] = {}
+
+    def add(self, key: K, rows: Matrix) -> None:
+        """Add the next rows, (N, width), of a key."""
+        self._series.setdefault(key, Thinned(self._width)).add(rows)
+
+    @property
+    def rows(self) -> dict[K, Matrix]:
+        """Rows by key, in the order in which the keys occurred."""
+        return {key: series.rows for key, series in self._series.items()}
+
+
+class TickSelection:
+    """Selects every n-th tick, the same for all topics, such that POINTS remain.
+
+    Attributes:
+        tick_ns: time between ticks, ns; 0 for a single tick.
+    """
+
+    def __init__(self, bag: Bag) -> None:
+        """Derive n from the number of truths and the time between the first two."""
+        first = [stamp for _, _, stamp in islice(bag.messages(["/truth"]), 2)]
+        self._start, self.tick_ns = first[0], first[-1] - first[0]
+        self._step = max(1, self.tick_ns * -(-bag.topics["/truth"].count // POINTS))
+
+    def __call__(self, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Whether each stamp (ns) is selected."""
+        selected: NDArray[np.bool_] = (stamps - self._start) % self._step == 0
+        return selected

@@ -1,0 +1,48 @@
+"""Definition of a topic as a bag carries it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Self
+
+from formation_gnc.errors import BagError
+from formation_gnc.recording.schema import schema_text, type_hash
+
+_INFINITE = "{sec: 9223372036, nsec: 854775807}"
+_OFFERED_QOS = f"""\
+- history: keep_last
+  depth: %d
+  reliability: reliable
+  durability: transient_local
+  deadline: {_INFINITE}
+  lifespan: {_INFINITE}
+  liveliness: automatic
+  liveliness_lease_duration: {_INFINITE}
+  avoid_ros_namespace_conventions: false
+"""
+
+
+@dataclass(frozen=True)
+class TopicDefinition:
+    """Message type of a topic, the type's definition, and rosbag2's channel metadata."""
+
+    type_name: str
+    schema: bytes
+    schema_encoding: str = "ros2msg"
+    message_encoding: str = "cdr"
+    metadata: Mapping[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def installed(cls, type_name: str, depth: int) -> Self:
+        """Definition from the installed message packages, offered reliable, transient-local, keep-last.
+
+        Args:
+            type_name: such as "std_msgs/msg/Header".
+            depth: of the publisher's queue.
+
+        Raises:
+            BagError: the type is not installed, or the depth is not positive.
+        """
+        if depth < 1:
+            raise BagError(f"queue depth {depth} is not allowed; it must be at least 1")
+        metadata = {"offered_qos_profiles": _OFFERED_QOS % depth, "topic_type_hash": type_hash(type_name)}
+        return cls(type_name, schema_text(type_name).encode(), metadata=metadata)
