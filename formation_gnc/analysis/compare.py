@@ -13,6 +13,7 @@ from formation_gnc.analysis.matplotlib_renderer import draw
 from formation_gnc.analysis.metrics import deputies_of, figures, trajectory
 from formation_gnc.analysis.plot import COLOURS, TIME, Axis, Curve, Plot, Style
 from formation_gnc.analysis.thinning import POINTS
+from formation_gnc.flight import topics
 from formation_gnc.recording.reader import Bag
 from formation_gnc.types import Vector
 
@@ -34,7 +35,7 @@ def gnc_topics(*bags: Bag) -> list[str]:
     return sorted(
         topic
         for topic, name in types.items()
-        if topic == "/clock" or (name.startswith("formation_gnc_msgs/") and name != TIMING_TYPE)
+        if topic == topics.CLOCK.name or (name.startswith("formation_gnc_msgs/") and name != TIMING_TYPE)
     )
 
 
@@ -44,10 +45,10 @@ def commanded_delta_v(bag: Bag, deputy: str) -> tuple[Vector, Vector]:
     Returns:
         (N,) time, s, and (N,) delta-v up to the end of that tick, all axes added, m/s.
     """
-    topic = f"/{deputy}/thrust"
+    topic = topics.THRUST.of(deputy)
     if topic not in bag.topics or bag.topics[topic].count == 0:
         return np.zeros(0), np.zeros(0)
-    thrust, truth = bag.arrays(topic), bag.arrays("/truth")
+    thrust, truth = bag.arrays(topic), bag.arrays(topics.TRUTH.name)
     prefix = f"deputies.{deputies_of(bag).index(deputy)}."
     mass = np.interp(thrust["time"], truth["time"], truth[f"{prefix}mass"])
     tick = float(truth["time"][1] - truth["time"][0]) if len(truth["time"]) > 1 else 0.0

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from formation_gnc.analysis.sensor_series import Channel, SensorSeries
 from formation_gnc.analysis.thinning import Thinned, ThinnedByKey, TickSelection
+from formation_gnc.flight import topics
 from formation_gnc.recording.decode import nanoseconds
 from formation_gnc.recording.reader import Fields
 from formation_gnc.types import Matrix, Vector
@@ -56,11 +57,11 @@ class DeputyHistory:
         self.total_delta_v, self._in_eclipse = 0.0, False
         self.eclipses: list[list[float]] = []
         self.handlers: dict[str, Callable[[Fields], None]] = {
-            "estimate": self._add_estimate,
-            "target": self._add_target,
-            "measurement": self._readings.add,
-            "status": self._add_status,
-            "timing": self._add_timing,
+            topics.ESTIMATE.name: self._add_estimate,
+            topics.TARGET.name: self._add_target,
+            topics.MEASUREMENT.name: self._readings.add,
+            topics.STATUS.name: self._add_status,
+            topics.TIMING.name: self._add_timing,
         }
         """Takes the next batch of messages, by topic."""
 

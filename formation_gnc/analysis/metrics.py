@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from formation_gnc.errors import BagError
+from formation_gnc.flight import topics
 from formation_gnc.recording.reader import Bag
 from formation_gnc.records import EventKind
 from formation_gnc.types import Matrix, Vector
@@ -76,9 +77,9 @@ def deputies_of(bag: Bag) -> list[str]:
     Raises:
         BagError: no truth.
     """
-    if "/truth" not in bag.topics or bag.topics["/truth"].count == 0:
+    if topics.TRUTH.name not in bag.topics or bag.topics[topics.TRUTH.name].count == 0:
         raise BagError(f"{bag.path}: has no truth")
-    _, first = next(bag.batches(["/truth"], 1))
+    _, first = next(bag.batches([topics.TRUTH.name], 1))
     count = sum(key.endswith(".name") for key in first)
     return [str(first[f"deputies.{index}.name"][0]) for index in range(count)]
 
@@ -89,12 +90,12 @@ def trajectory(bag: Bag, deputy: str) -> Trajectory:
     Raises:
         BagError: no truth, or no tick with an estimate and a target of this deputy.
     """
-    truth = bag.arrays("/truth")
+    truth = bag.arrays(topics.TRUTH.name)
     index = deputies_of(bag).index(deputy)
-    missing = [topic for topic in ("estimate", "target") if f"/{deputy}/{topic}" not in bag.topics]
+    missing = [topic.name for topic in (topics.ESTIMATE, topics.TARGET) if topic.of(deputy) not in bag.topics]
     if missing:
         raise BagError(f"{bag.path}: has no {' and no '.join(missing)} of {deputy}")
-    estimate, target = bag.arrays(f"/{deputy}/estimate"), bag.arrays(f"/{deputy}/target")
+    estimate, target = bag.arrays(topics.ESTIMATE.of(deputy)), bag.arrays(topics.TARGET.of(deputy))
     stamps = np.intersect1d(np.intersect1d(truth["stamp_ns"], estimate["stamp_ns"]), target["stamp_ns"])
     if not len(stamps):
         raise BagError(f"{bag.path}: no tick with an estimate and a target of {deputy}")
@@ -137,6 +138,6 @@ def figures(bag: Bag) -> RunFigures:
             delta_v_m_s=float(path.delta_v.sum()),
             delta_v_axes_m_s=path.delta_v.tolist(),
         )
-    has_events = "/events" in bag.topics and bag.topics["/events"].count > 0
-    misses = np.count_nonzero(bag.arrays("/events").integers("kind") == EventKind.MISS) if has_events else 0
-    return RunFigures(bag.topics["/truth"].count, int(misses), deputies)
+    has_events = topics.EVENTS.name in bag.topics and bag.topics[topics.EVENTS.name].count > 0
+    misses = np.count_nonzero(bag.arrays(topics.EVENTS.name).integers("kind") == EventKind.MISS) if has_events else 0
+    return RunFigures(bag.topics[topics.TRUTH.name].count, int(misses), deputies)

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from formation_gnc.analysis.metrics import deputies_of
 from formation_gnc.errors import BagError
-from formation_gnc.recording.reader import Fields, Bag
+from formation_gnc.flight import topics
+from formation_gnc.recording.reader import Bag, Fields
 from formation_gnc.records import Rejection
 from formation_gnc.types import Matrix, Vector
 
@@ -134,7 +135,7 @@ def figures_of_estimates(estimates: EstimateHistory, stamps: Stamps, truth: Matr
 
 
 def _arrays(bag: Bag, deputy: str) -> Fields:
-    topic = f"/{deputy}/estimate"
+    topic = topics.ESTIMATE.of(deputy)
     if topic not in bag.topics or not bag.topics[topic].count:
         raise BagError(f"{bag.path}: has no estimate of {deputy}")
     return bag.arrays(topic)
@@ -145,5 +146,5 @@ def _truth(bag: Bag, deputy: str) -> tuple[Stamps, Matrix]:
     names = deputies_of(bag)
     if deputy not in names:
         raise BagError(f"{bag.path}: has no truth of {deputy}; it has {', '.join(names)}")
-    truth = bag.arrays("/truth")
+    truth = bag.arrays(topics.TRUTH.name)
     return truth["stamp_ns"], truth[f"deputies.{names.index(deputy)}.relative_state"]

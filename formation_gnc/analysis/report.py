@@ -13,6 +13,7 @@ from formation_gnc.analysis.plot import Plot
 from formation_gnc.analysis.plotly_renderer import draw_columns, draw_space
 from formation_gnc.analysis.run_history import RunHistory
 from formation_gnc.analysis.timeline import Timeline
+from formation_gnc.flight import topics
 from formation_gnc.recording.reader import Bag
 
 _STYLE = """
@@ -70,7 +71,7 @@ def _figures[H](history: H, panels: Sequence[Panel[H]], timeline: Timeline) -> d
 
 
 def _summary(run: RunHistory, bag: Bag) -> dict[str, Any]:
-    ticks = bag.topics["/truth"].count
+    ticks = bag.topics[topics.TRUTH.name].count
     rows: dict[str, Any] = {"simulated time": f"{ticks * run.tick:g} s", "ticks": ticks}
     rows |= {f"delta-v of {name}": f"{1e3 * each.total_delta_v:.3f} mm/s" for name, each in run.deputies.items()}
     if run.nearest is not None:

@@ -11,7 +11,8 @@ from formation_gnc.analysis.metrics import deputies_of
 from formation_gnc.analysis.separation import Separation, minimum_separation
 from formation_gnc.analysis.thinning import ThinnedByKey, TickSelection
 from formation_gnc.analysis.timeline import Mark, Timeline, event_colours
-from formation_gnc.recording.reader import Fields, Bag
+from formation_gnc.flight import topics
+from formation_gnc.recording.reader import Bag, Fields
 from formation_gnc.records import kind_name
 from formation_gnc.types import Matrix
 
@@ -44,7 +45,10 @@ class RunHistory:
         self.event_counts: Counter[str] = Counter()
         self.nearest: Separation | None = None
         self._distances = ThinnedByKey[tuple[str, str]](2)
-        handlers: dict[str, Callable[[Fields], None]] = {"/truth": self._add_truth, "/events": self._add_events}
+        handlers: dict[str, Callable[[Fields], None]] = {
+            topics.TRUTH.name: self._add_truth,
+            topics.EVENTS.name: self._add_events,
+        }
         for name, deputy in self.deputies.items():
             handlers |= {f"/{name}/{topic}": handler for topic, handler in deputy.handlers.items()}
         for topic, batch in bag.batches([topic for topic in handlers if topic in bag.topics]):

@@ -7,6 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from formation_gnc.analysis.metrics import deputies_of
+from formation_gnc.flight import topics
 from formation_gnc.recording.decode import nanoseconds
 from formation_gnc.recording.reader import Bag
 from formation_gnc.types import Matrix, Vector
@@ -53,13 +54,16 @@ def predicted_approach(bag: Bag, kind: str) -> Separation | None:
     """
     nearest: Separation | None = None
     for name in deputies_of(bag):
-        topic = f"/{name}/separation"
+        topic = topics.SEPARATION.of(name)
         if topic not in bag.topics or not bag.topics[topic].count:
             continue
         predicted = bag.arrays(topic)
         index = int(predicted[kind].argmin())
         distance = float(predicted[kind][index])
         if nearest is None or distance < nearest.distance:
-            when, other = 1e-9 * nanoseconds(predicted, f"{kind}_time")[index], str(predicted[f"{kind}_neighbour"][index])
+            when, other = (
+                1e-9 * nanoseconds(predicted, f"{kind}_time")[index],
+                str(predicted[f"{kind}_neighbour"][index]),
+            )
             nearest = Separation(distance, float(when), (name, other))
     return nearest

@@ -5,6 +5,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
+from formation_gnc.flight import topics
 from formation_gnc.recording.reader import Bag
 from formation_gnc.types import Matrix
 
@@ -57,9 +58,9 @@ class TickSelection:
 
     def __init__(self, bag: Bag) -> None:
         """Derive n from the number of truths and the time between the first two."""
-        first = [stamp for _, _, stamp in islice(bag.messages(["/truth"]), 2)]
+        first = [stamp for _, _, stamp in islice(bag.messages([topics.TRUTH.name]), 2)]
         self._start, self.tick_ns = first[0], first[-1] - first[0]
-        self._step = max(1, self.tick_ns * -(-bag.topics["/truth"].count // POINTS))
+        self._step = max(1, self.tick_ns * -(-bag.topics[topics.TRUTH.name].count // POINTS))
 
     def __call__(self, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Whether each stamp (ns) is selected."""

@@ -6,13 +6,20 @@ the estimates are the recorded ones bit for bit. Errors are against the recorded
 
 import argparse
 import json
+import tempfile
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
 
+from formation_gnc.analysis.navigation_figures import NavigationFigures, common_stamps, navigation_figures
 from formation_gnc.errors import ConfigurationError
+from formation_gnc.flight import topics
+
+if TYPE_CHECKING:
+    from formation_gnc.recording.reader import Bag
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,34 +35,56 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print the figures as one JSON object")
 
 
+@dataclass(frozen=True)
+class Comparison:
+    """The recorded filter of a deputy and the replayed one, on the ticks that both answered."""
+
+    recorded: NavigationFigures
+    now: NavigationFigures
+    identical: bool
+    """Whether every estimate is the recorded one, bit for bit."""
+
+
 def run(options: argparse.Namespace) -> int:
-    """Fly the filter again, compare, print."""
+    """Replay the navigation of every deputy, compare, print."""
     from formation_gnc.analysis.metrics import deputies_of
-    from formation_gnc.navigation.open_loop import Comparison, as_json, compare
     from formation_gnc.recording.reader import Bag
-    from formation_gnc.sil.scenario import given_to
+    from formation_gnc.transport.replay_recorder import replay_into
 
     bag = Bag(options.bag)
     known = deputies_of(bag)
     if options.deputy is not None and options.deputy not in known:
         raise ConfigurationError(f"deputy {options.deputy}: not in {options.bag}; it has {', '.join(known)}")
-    comparisons: list[Comparison] = []
-    for deputy in [options.deputy] if options.deputy else known:
-        node = f"/{deputy}/navigation"
-        comparisons.append(compare(bag, deputy, given_to(options.params, node) if options.params else {}))
+    with tempfile.TemporaryDirectory(prefix="formation_gnc-") as directory:
+        replayed = Path(directory) / "replay"
+        replay_into(bag, replayed, ["navigation"], options.params)
+        deputies = [options.deputy] if options.deputy else known
+        comparisons = {deputy: _compare(bag, Bag(replayed), deputy) for deputy in deputies}
     if options.json:
-        print(json.dumps({"bag": str(options.bag), "deputies": {c.deputy: as_json(c) for c in comparisons}}, indent=2))
+        figures = {deputy: asdict(each) for deputy, each in comparisons.items()}
+        print(json.dumps({"bag": str(options.bag), "deputies": figures}, indent=2))
         return 0
     console = Console(highlight=False)
-    for comparison in comparisons:
-        console.print(_table(comparison))
+    for deputy, comparison in comparisons.items():
+        console.print(_table(deputy, comparison))
         said = "the recorded ones, bit for bit" if comparison.identical else "not the recorded ones"
         console.print(f"{comparison.now.estimates} estimates: {said}")
     return 0
 
 
-def _table(comparison: Any) -> Table:
-    table = Table(title=f"{comparison.deputy}: estimate against truth", title_justify="left")
+def _compare(recorded: "Bag", replayed: "Bag", deputy: str) -> Comparison:
+    from formation_gnc.recording.difference import identical
+
+    stamps = common_stamps(recorded, replayed, deputy)
+    return Comparison(
+        navigation_figures(recorded, deputy, stamps),
+        navigation_figures(replayed, deputy, stamps),
+        not identical(recorded, replayed, [topics.ESTIMATE.of(deputy)]),
+    )
+
+
+def _table(deputy: str, comparison: Comparison) -> Table:
+    table = Table(title=f"{deputy}: estimate against truth", title_justify="left")
     table.add_column("figure")
     sides = {"recorded": comparison.recorded, "now": comparison.now}
     for name in sides:

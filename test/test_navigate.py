@@ -7,9 +7,6 @@ from typing import Any
 import pytest
 
 from formation_gnc.cli import main
-from formation_gnc.errors import ConfigurationError
-from formation_gnc.navigation.open_loop import compare
-from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
@@ -61,34 +58,52 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ],
 )
 def test_the_unchanged_filter_gives_the_recorded_bits(
-    tmp_path: Path, change_at: int, navigation: dict[str, Any]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], change_at: int, navigation: dict[str, Any]
 ) -> None:
-    same = compare(Bag(recorded(tmp_path / "bag", change_at, **navigation)), "deputy1", {})
-    assert same.identical
-    assert same.now == same.recorded
-    assert same.now.rejections["gate"] > 0
+    same = navigate(capsys, recorded(tmp_path / "bag", change_at, **navigation))
+    assert same["identical"]
+    assert same["now"] == same["recorded"]
+    assert same["now"]["rejections"]["gate"] > 0
 
 
-def test_another_filter_gives_other_estimates_of_the_same_flight(bag: Path) -> None:
-    more = compare(Bag(bag), "deputy1", {"sensors": ["radius", "range_rate", "latitude", "right_ascension"]})
-    assert not more.identical
-    assert more.now.readings > more.recorded.readings
-    assert more.now.within_3_sigma > 0.95
+def navigate(capsys: pytest.CaptureFixture[str], bag: Path, parameters: str = "") -> Any:
+    """What `formation-gnc navigate --json` says of deputy1, with other parameters of its filter."""
+    arguments = ["navigate", str(bag), "--json"]
+    if parameters:
+        changed = bag.with_name("changed.yaml")
+        changed.write_text(f"/**/navigation:\n  ros__parameters: {parameters}\n")
+        arguments += ["--params", str(changed)]
+    assert main(arguments) == 0
+    return json.loads(capsys.readouterr().out)["deputies"]["deputy1"]
 
 
-def test_what_the_command_prints(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_one_more_sensor_gives_other_estimates_of_the_same_flight(
+    bag: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    more = navigate(capsys, bag, "{sensors: [radius, range_rate, latitude, right_ascension]}")
+    assert not more["identical"]
+    assert more["now"]["readings"] > more["recorded"]["readings"]
+    assert more["now"]["within_3_sigma"] > 0.95
+    assert more["now"]["estimates"] == more["recorded"]["estimates"] == 600
+
+
+def test_the_table_says_whether_the_bits_are_the_recorded_ones(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["navigate", str(bag)]) == 0
     assert "bit for bit" in capsys.readouterr().out
-    changed = tmp_path / "changed.yaml"
-    changed.write_text("/**/navigation:\n  ros__parameters: {radius_sigma: 50.0}\n")
-    assert main(["navigate", str(bag), "--params", str(changed), "--json"]) == 0
-    printed = json.loads(capsys.readouterr().out)["deputies"]["deputy1"]
-    assert printed["identical"] is False
-    assert printed["now"]["estimates"] == printed["recorded"]["estimates"] == 600
 
 
-def test_what_cannot_be_run_is_named(bag: Path) -> None:
-    with pytest.raises(ConfigurationError, match="radius_sigma"):
-        compare(Bag(bag), "deputy1", {"radius_sigma": -1.0})
-    with pytest.raises(ConfigurationError, match="deputy9"):
-        compare(Bag(bag), "deputy9", {})
+@pytest.mark.parametrize(
+    ("arguments", "words"), [(["--deputy", "deputy9"], "deputy9"), (["--params", "missing.yaml"], "missing.yaml")]
+)
+def test_what_cannot_be_replayed_is_named(
+    bag: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], words: str
+) -> None:
+    assert main(["navigate", str(bag), *arguments]) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_a_parameter_that_is_not_allowed_is_named(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    changed = bag.with_name("wrong.yaml")
+    changed.write_text("/**/navigation:\n  ros__parameters: {radius_sigma: -1.0}\n")
+    assert main(["navigate", str(bag), "--params", str(changed)]) == 2
+    assert "radius_sigma" in capsys.readouterr().err
