@@ -1,7 +1,7 @@
-"""How near satellites will come to one another."""
+"""Predicted separations in a fleet."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -10,40 +10,58 @@ from formation_gnc.records import Separation, Target
 from formation_gnc.types import NANOSECONDS, Matrix, Vector
 
 POINTS = 60
-"""Points of a revolution at which distances are looked at; between two, satellites move straight on, which
-leaves out a thousandth of the distance."""
+"""Points of a revolution at which distances are computed. Straight paths between them leave out a thousandth
+of the distance."""
+
+
+class SeparationMonitor:
+    """When to predict separations, and whether the latest prediction was below the warning distance."""
+
+    def __init__(self) -> None:
+        """With a prediction due at once."""
+        self._latest: int | None = None
+        self.is_warning = False
+        """Whether the latest prediction was below the warning distance."""
+
+    def is_due(self, time: int, interval: float) -> bool:
+        """Whether the latest prediction is at least an interval (s) old at a time (ns)."""
+        return self._latest is None or time - self._latest >= interval * NANOSECONDS
+
+    def note(self, separation: Separation, warning: float) -> None:
+        """Take note of a prediction, given the warning distance (m)."""
+        self._latest = separation.time
+        self.is_warning = min(separation.planned, separation.passive) < warning
 
 
 def predict(
     path: TargetPath,
     target: Target,
     state: Vector,
-    names: list[str],
-    neighbours: Mapping[str, TargetPath],
+    names: Sequence[str],
+    neighbour_paths: Mapping[str, TargetPath],
     horizon: float,
     mean_motion: float,
 ) -> Separation:
-    """Least distance of a satellite to the others: along its preview, and if nobody's thrusters fire.
+    """Least distance of a satellite to its neighbours: planned, along its preview, and passive, without thrust.
 
-    Along the preview the satellite is on its target; of the others, who has a known path is on it, and the
-    rest coast.
+    Planned, the satellite follows its target, a neighbour with a known path follows that, and all others coast.
 
     Args:
-        path: gives the model in which satellites coast.
-        target: where the satellite is to be, with the preview, and where the others are.
-        state: (6,) where it is, Hill frame, m and m/s.
-        names: of the others, one or more.
-        neighbours: paths of others, by name, as far as they are known.
-        horizon: revolutions for which all coast.
-        mean_motion: rate of the chief, rad/s.
+        path: of this satellite's target; satellites coast in its model.
+        target: of this satellite, with its preview and the states of the neighbours.
+        state: (6,) of this satellite, Hill frame, m and m/s.
+        names: of the neighbours, at least one.
+        neighbour_paths: target paths of neighbours by name, as far as they are known.
+        horizon: of the passive separation, revolutions.
+        mean_motion: of the chief, rad/s.
     """
     time = target.time / NANOSECONDS
     ahead = target.preview_step / NANOSECONDS * np.arange(len(target.preview) + 1.0)
-    others = path.coast(target.neighbours, time, ahead)
+    neighbours = path.coast(target.neighbours, time, ahead)
     for index, name in enumerate(names):
-        if name in neighbours:
-            others[:, index] = neighbours[name].states(time + ahead)
-    planned = np.vstack([target.relative_state, target.preview])[:, None] - others
+        if name in neighbour_paths:
+            neighbours[:, index] = neighbour_paths[name].states(time + ahead)
+    planned = np.vstack([target.relative_state, target.preview])[:, None] - neighbours
     later: Vector = np.linspace(0.0, horizon * math.tau / mean_motion, math.ceil(horizon * POINTS) + 1)
     passive = path.coast(state - target.neighbours, time, later)
     near, far = _nearest(planned, ahead), _nearest(passive, later)
@@ -58,18 +76,23 @@ def predict(
     )
 
 
-def in_words(separation: Separation) -> str:
-    """For an event."""
+def describe(separation: Separation) -> str:
+    """A separation as the text of an event."""
     return (
-        f"{separation.planned:.1f} m from {separation.planned_neighbour} at "
-        f"{separation.planned_time / NANOSECONDS:.0f} s on target, "
-        f"{separation.passive:.1f} m from {separation.passive_neighbour} at "
-        f"{separation.passive_time / NANOSECONDS:.0f} s without thrust"
+        f"planned {separation.planned:.1f} m from {separation.planned_neighbour} at "
+        f"{separation.planned_time / NANOSECONDS:.0f} s, "
+        f"passive {separation.passive:.1f} m from {separation.passive_neighbour} at "
+        f"{separation.passive_time / NANOSECONDS:.0f} s"
     )
 
 
 def _nearest(offsets: Matrix, times: Vector) -> tuple[float, float, int]:
-    """Least distance (m), when (s) and of whom, given relative states (K, N, 6) at times (K,)."""
+    """Least distance (m), its time (s) and the index of the neighbour.
+
+    Args:
+        offsets: (K, N, 6) states relative to N neighbours.
+        times: (K,) s, of the offsets; between them motion is straight.
+    """
     position, velocity = offsets[..., :3], offsets[..., 3:]
     half = 0.5 * np.gradient(times)[:, None] if len(times) > 1 else np.zeros((1, 1))
     speed = np.maximum((velocity**2).sum(axis=-1), 1e-300)

@@ -1,6 +1,7 @@
 """The guidance node: estimates in, targets out; in a fleet, predicted separations too."""
 
-from formation_gnc.guidance.guidance import Guidance, GuidanceParameters
+from formation_gnc.guidance.guidance import Guidance
+from formation_gnc.guidance.parameters import GuidanceParameters
 from formation_gnc.records import NavigationState, Separation, Target
 from formation_gnc.transport import topics
 from formation_gnc.transport.bus import IntraProcessBus
@@ -14,7 +15,7 @@ class GuidanceNode(ModuleNode[Guidance]):
         """Listen and speak in the deputy's namespace, and listen to the others of a fleet."""
         super().__init__("guidance", GuidanceParameters, Guidance, bus)
         self.publish = self.say(Target, topics.TARGET)
-        others = {f"/{name}/{topics.ESTIMATE}": NavigationState for name in self.part.others}
+        others = {f"/{name}/{topics.ESTIMATE}": NavigationState for name in self.part.neighbours}
         self.answer(self.on_tick, {topics.ESTIMATE: NavigationState}, others)
         if others:
             self.publish_separation = self.speak(Separation, topics.SEPARATION)

@@ -20,7 +20,8 @@ from formation_gnc.control.controller_manager import ControllerManager, Controll
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight.module import Configuration, FlightModule
 from formation_gnc.flight.synchronizer import StampSynchronizer
-from formation_gnc.guidance.guidance import Guidance, GuidanceParameters
+from formation_gnc.guidance.guidance import Guidance
+from formation_gnc.guidance.parameters import GuidanceParameters
 from formation_gnc.navigation.navigation_filter import NavigationFilter, NavigationParameters
 from formation_gnc.parameters import OWN_OF_ROS, dump, load, to_json
 from formation_gnc.recording.provenance import parameters_record
@@ -88,7 +89,7 @@ class ReplayedPart:
 
     def tick(self, time: int, inputs: list[Any], swaps: list[Event]) -> tuple[tuple[Any, ...], list[Event]]:
         """Outputs, none while there is no state, and events of a tick on which `swaps` were recorded."""
-        scheduled = [_new_values(foreseen) for at, foreseen in self._part.foreseen if at <= time]
+        scheduled = [_new_values(pending) for at, pending in self._part.pending if at <= time]
         for swap in swaps:
             changes = {change.name: change.new_value for change in swap.changes}
             if changes in scheduled:
@@ -111,10 +112,10 @@ class ReplayedPart:
         return is_heard
 
 
-def _new_values(foreseen: Configuration[Any, Any]) -> dict[str, str]:
+def _new_values(scheduled: Configuration[Any, Any]) -> dict[str, str]:
     """Values that a scheduled change brings, by name, as its event will have them."""
-    values = dump(foreseen.parameters)
-    return {name: to_json(values[name]) for name in foreseen.changes}
+    values = dump(scheduled.parameters)
+    return {name: to_json(values[name]) for name in scheduled.changes}
 
 
 def parameters_of(bag: Bag, node: str, start: int | None = None) -> dict[str, Any]:

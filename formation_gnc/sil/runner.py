@@ -27,13 +27,13 @@ class Satellite:
         self.navigator = NavigationFilter(f"/{name}/navigation", setup.navigation)
         self.guide = Guidance(f"/{name}/guidance", setup.guidance)
         self.autopilot = ControllerManager(f"/{name}/controller", setup.controller)
-        self._meeting = StampSynchronizer((name, *self.guide.others), needed=1)
+        self._meeting = StampSynchronizer((name, *self.guide.neighbours), needed=1)
         self.parts: tuple[FlightModule[Any, Any], ...] = (self.navigator, self.guide, self.autopilot)
 
     def on_tick(self, estimates: Mapping[str, Estimate | None], sink: Sink) -> Thrust | None:
         """From the estimates of all deputies to thrust; none when there is nothing to act on."""
         estimate, records, thrust = estimates[self.name], None, None
-        for name in (*self.guide.others, self.name):
+        for name in (*self.guide.neighbours, self.name):
             if (each := estimates[name]) is not None:
                 records = self._meeting.take(name, each)
         if estimate is not None:

@@ -13,7 +13,8 @@ import yaml
 import formation_gnc
 from formation_gnc.control.controller_manager import ControllerParameters
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.guidance.guidance import GuidanceParameters, check_places
+from formation_gnc.guidance.fleet_checks import check_fleet
+from formation_gnc.guidance.parameters import GuidanceParameters
 from formation_gnc.navigation.navigation_filter import NavigationParameters
 from formation_gnc.parameters import dump, load, read_yaml
 from formation_gnc.plant.plant import PlantParameters
@@ -29,7 +30,7 @@ class DeputySetup:
     """Checked parameters of one deputy's parts."""
 
     navigation: NavigationParameters
-    guidance: Any
+    guidance: GuidanceParameters
     controller: Any
 
 
@@ -87,7 +88,7 @@ def load_scenario(name: str, overrides: Mapping[str, Mapping[str, Any]] | None =
             )
             for deputy in plant.deputies
         }
-        check_places({name: setup.guidance for name, setup in deputies.items()})
+        check_fleet({name: setup.guidance for name, setup in deputies.items()})
     except ConfigurationError as error:
         raise ConfigurationError(f"{path.name}: {error}") from None
     return Scenario(path.stem, plant, deputies)
