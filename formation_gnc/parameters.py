@@ -1,9 +1,10 @@
 """Typed schemas of parameters.
 
-A schema is a frozen dataclass whose fields are made with :func:`parameter`. The declaration as ROS
-parameters, checks, YAML defaults and the reference page all derive from it. Nested schemas become dotted
-names; a field made with :func:`per_name` holds a nested schema for every name that another field lists, with
-the name as prefix: ``deputy1.mass``.
+A schema is a frozen dataclass whose fields are made with :func:`parameter`. Declaration as ROS parameters,
+checks, YAML defaults and the reference page all come from it. Nested schemas become dotted names. A field
+made with :func:`per_name` holds one nested schema for every name that another field lists, one made with
+:func:`per_entry` the schema of every entry of a registry; those names are the prefix: ``deputy1.mass``,
+``lqr.thrust``.
 """
 
 import dataclasses
@@ -11,7 +12,7 @@ import difflib
 import json
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass
 from typing import Any, get_args, get_origin, get_type_hints
 
@@ -47,7 +48,8 @@ class Limits:
     above: float = -math.inf
     """Exclusive lower bound."""
     maximum: float = math.inf
-    choices: tuple[str, ...] = ()
+    choices: Collection[str] = ()
+    """Allowed strings; a registry stands for the names that it has when a value is checked."""
     length: int | None = None
     """Number of values of an array; None for any."""
     in_flight: bool = False
@@ -77,6 +79,17 @@ def parameter(default: Any = MISSING, **limits: Any) -> Any:
 def per_name(names: str) -> Any:
     """Declare a dict of nested schemas, one for each name that the parameter `names` lists."""
     return dataclasses.field(default_factory=dict, metadata={"names": names})
+
+
+def per_entry(registry: Mapping[str, Any]) -> Any:
+    """Declare a dict of nested schemas: `Parameters` of each entry of a registry, by the entry's name.
+
+    The registry is read at every use: an entry added after import has its parameters like any other.
+    """
+    return dataclasses.field(
+        default_factory=lambda: {name: entry.Parameters() for name, entry in registry.items()},
+        metadata={"registry": registry},
+    )
 
 
 @dataclass(frozen=True)
@@ -135,6 +148,18 @@ def _is_list(value: Any) -> bool:
     return isinstance(value, Sequence) and not isinstance(value, str | bytes)
 
 
+def _members(field: dataclasses.Field[Any], kind: Any, listed: Any) -> dict[str, type] | None:
+    """Nested schemas by name of a field made with :func:`per_name` or :func:`per_entry`; None for any other.
+
+    `kind` is the field's type, `listed` the value of the parameter that lists the names.
+    """
+    if "registry" in field.metadata:
+        return {name: entry.Parameters for name, entry in field.metadata["registry"].items()}
+    if "names" in field.metadata:
+        return {str(name): get_args(kind)[1] for name in (listed if _is_list(listed) else ())}
+    return None
+
+
 def leaves(schema: type, values: Mapping[str, Any], prefix: str = "", defaults: Any = MISSING) -> Iterator[Leaf]:
     """All parameters of a schema, in order.
 
@@ -149,11 +174,12 @@ def leaves(schema: type, values: Mapping[str, Any], prefix: str = "", defaults: 
     fields = {field.name: field for field in dataclasses.fields(schema)}
     for field in fields.values():
         kind, name = hints[field.name], prefix + field.name
-        if "names" in field.metadata:
-            source = field.metadata["names"]
-            listed = values.get(prefix + source, fields[source].default)
-            for key in listed if _is_list(listed) else ():
-                yield from leaves(get_args(kind)[1], values, f"{prefix}{key}.")
+        source = field.metadata.get("names")
+        listed = values.get(prefix + source, fields[source].default) if source else ()
+        members = _members(field, kind, listed)
+        if members is not None:
+            for key, nested in members.items():
+                yield from leaves(nested, values, f"{prefix}{key}.")
             continue
         default = field.default if defaults is MISSING else getattr(defaults, field.name)
         if dataclasses.is_dataclass(kind):
@@ -195,9 +221,9 @@ def _build[T](schema: type[T], checked: Mapping[str, Any], prefix: str) -> T:
     fields: dict[str, Any] = {}
     for field in dataclasses.fields(schema):  # type: ignore[arg-type]
         kind, name = hints[field.name], prefix + field.name
-        if "names" in field.metadata:
-            keys = fields[field.metadata["names"]]
-            fields[field.name] = {key: _build(get_args(kind)[1], checked, f"{prefix}{key}.") for key in keys}
+        members = _members(field, kind, fields.get(field.metadata.get("names", "")))
+        if members is not None:
+            fields[field.name] = {key: _build(each, checked, f"{prefix}{key}.") for key, each in members.items()}
         elif dataclasses.is_dataclass(kind):
             fields[field.name] = _build(kind, checked, f"{name}.")  # type: ignore[arg-type]
         else:
@@ -210,7 +236,7 @@ def dump(instance: Any, prefix: str = "") -> dict[str, Any]:
     flat: dict[str, Any] = {}
     for field in dataclasses.fields(instance):
         value = getattr(instance, field.name)
-        if "names" in field.metadata:
+        if field.metadata.keys() & {"names", "registry"}:
             for key, nested in value.items():
                 flat |= dump(nested, f"{prefix}{key}.")
         elif dataclasses.is_dataclass(value):

@@ -60,7 +60,7 @@ def path(name: str, slot: int, model: str, common: CommonParameters) -> TargetPa
 def places(name: str) -> range:
     """The places that are flown: all, or the first four of a formation without end."""
     formation = FORMATIONS[name]
-    return range(formation.places(formation.Parameters()) or 4)
+    return range(formation.slot_count(formation.Parameters()) or 4)
 
 
 def flown(starts: Array, common: CommonParameters, forces: Forces) -> Array:

@@ -14,7 +14,8 @@ from formation_gnc.flight import topics
 from formation_gnc.flight.module import FlightModule
 from formation_gnc.flight.synchronizer import StampSynchronizer
 from formation_gnc.flight.topics import Topic
-from formation_gnc.guidance.guidance import Guidance, GuidanceParameters
+from formation_gnc.guidance.guidance import Guidance
+from formation_gnc.guidance.parameters import GuidanceParameters
 from formation_gnc.navigation.navigation_filter import NavigationFilter, NavigationParameters
 from formation_gnc.records import Event, NavigationState
 

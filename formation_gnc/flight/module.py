@@ -1,4 +1,4 @@
-"""A part of a satellite's software whose parameters change in flight, at a tick."""
+"""Flight modules: navigation, guidance and control, with parameters that change in flight at a tick."""
 
 import math
 from abc import ABC, abstractmethod
@@ -7,78 +7,79 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-import yaml
-
 from formation_gnc.common import CommonParameters
 from formation_gnc.errors import ConfigurationError, ParameterError
-from formation_gnc.parameters import change, dump, parameter, read_yaml, to_json
+from formation_gnc.flight.schedule import parse_schedule
+from formation_gnc.parameters import change, dump, parameter, to_json
 from formation_gnc.records import Event, EventKind, ParameterChange
 from formation_gnc.types import NANOSECONDS
 
 
 @dataclass(frozen=True)
 class ModuleParameters(CommonParameters):
-    """Parameters of a part, and changes of them foreseen for given times."""
+    """Parameters of a flight module."""
 
     schedule: tuple[str, ...] = parameter(
         (),
         in_flight=True,
-        doc="changes in flight, each `{at: SECONDS, PARAMETER: VALUE, ...}`, taking effect at the first tick "
-        "from then on; a new schedule may keep entries that are over, and what it adds must be to come",
+        doc="changes in flight, each `{at: SECONDS, PARAMETER: VALUE, ...}`, effective at the first tick at or "
+        "after its time; a new schedule may keep past entries, and the entries it adds must be in the future",
     )
 
 
 @dataclass(frozen=True)
 class Configuration[P, D]:
-    """Parameters together with what was designed from them."""
+    """Parameters and the design made from them."""
 
     parameters: P
     design: D
     changes: Mapping[str, Any]
+    """New values, by name, that led to these parameters."""
     plan: "Plan[P, D]" = ()
-    """What its schedule brings, if that is one of the changes."""
+    """The scheduled configurations, where `changes` sets the schedule."""
 
 
 type Plan[P, D] = tuple[tuple[int, Configuration[P, D]], ...]
-"""Configurations and the times (ns) from which they are to hold, in order."""
+"""Scheduled configurations with the times (ns) from which they hold, in order of time."""
 
 
 class FlightModule[P: ModuleParameters, D](ABC):
-    """Navigation, guidance or control of one deputy: parameters, what is designed from them, and swaps.
+    """A GNC module of one deputy: parameters, the design made from them, and changes of both in flight.
 
-    A change goes in two steps. `stage` checks it and designs, which may be slow, touches nothing and may
-    run in another thread; `commit` hands the result over, and it takes effect when the next tick begins.
+    A change has two steps. `stage` validates it and makes the new design; it may be slow, has no effect and
+    may run in another thread. `commit` queues the result, which takes effect when the next tick begins.
+
+    A subclass has `design`, and an `on_tick` that calls `begin_tick` first. Where it needs them, it overrides
+    `reset`, `activate`, and the vetoes `check_staged`, `check_due` and `check_plan`.
     """
 
     neighbours: tuple[str, ...] = ()
     """Names of the fleet's other satellites whose outputs it takes."""
+    time: int
+    """Stamp of the current tick, ns."""
+    configuration: Configuration[P, D]
+    """The configuration in force."""
+    pending: Plan[P, D]
+    """The scheduled configurations that are not in force yet."""
 
     def __init__(self, name: str, parameters: P) -> None:
-        """Design from `parameters` and from every change they schedule; `name` is the node's full name.
+        """Design for `parameters` and for every change they schedule; `name` is the node's full name.
 
         Raises:
             ConfigurationError: a design fails, or a scheduled change is not allowed.
         """
         self.name = name
         self.events: list[Event] = []
-        self._given, self._changes = parameters, dict[str, Any]()
-        self._adopted = deque[Configuration[P, D]]()
-        self._start()
-
-    def _start(self) -> None:
-        parameters = change(self._given, self._changes)
-        self._time = 0
-        self.configuration: Configuration[P, D] = Configuration(parameters, self.design(parameters), {})
-        self.foreseen: Plan[P, D] = self._plan(self.configuration, -math.inf)
-        """What is scheduled and still to come."""
-        self.reset()
-
-    def reset(self) -> None:  # noqa: B027 - optional
-        """Start without a memory of earlier ticks; called before the first tick of every run."""
+        self._initial, self._kept = parameters, dict[str, Any]()
+        self._committed = deque[Configuration[P, D]]()
+        self._begin_run()
 
     @abstractmethod
     def design(self, parameters: P) -> D:
-        """What flies with these parameters; raises ConfigurationError when nothing can."""
+        """The design for these parameters; raises ConfigurationError when there is none."""
+
+    def reset(self) -> None:  # noqa: B027 - optional
+        """Clear the state kept between ticks; called at the start of every run, before its schedule is planned."""
 
     @abstractmethod
     def on_tick(self, *args: Any, **kwargs: Any) -> Any:
@@ -88,98 +89,71 @@ class FlightModule[P: ModuleParameters, D](ABC):
         """
 
     def activate(self, old: Configuration[P, D], new: Configuration[P, D]) -> None:  # noqa: B027 - optional
-        """Hand the state of the old design to the new one; called at the tick where it takes over."""
+        """Hand over the state of the old design to the new one; called at the tick of the change."""
+
+    def check_staged(self, staged: Configuration[P, D]) -> None:  # noqa: B027 - optional
+        """Raise ConfigurationError for a change that may not be made in flight now; called by `stage`."""
+
+    def check_due(self, time: int, due: Configuration[P, D]) -> None:  # noqa: B027 - optional
+        """Raise ConfigurationError for a change that may not take effect at the tick at `time` (ns)."""
+
+    def check_plan(self, start: Configuration[P, D], plan: Plan[P, D]) -> None:  # noqa: B027 - optional
+        """Raise ConfigurationError for scheduled changes that may not follow one another, or `start`."""
 
     @property
     def parameters(self) -> P:
         """The parameters in force."""
         return self.configuration.parameters
 
-    def stage(self, changes: Mapping[str, Any]) -> Configuration[P, D]:
-        """Check a change of parameters and design from it, without effect yet.
+    def derive(self, parameters: P, changes: Mapping[str, Any]) -> Configuration[P, D]:
+        """The configuration for changed parameters, with the plan of a changed schedule; has no effect.
 
         Raises:
-            ConfigurationError: the change is not allowed, or the design fails; nothing has changed.
+            ConfigurationError: the change is not allowed, or a design fails.
         """
-        waiting = tuple(self._adopted)
-        return self._design_from(self.parameters, {**waiting[-1].changes, **changes} if waiting else changes)
-
-    def _design_from(self, parameters: P, changes: Mapping[str, Any]) -> Configuration[P, D]:
         changed = change(parameters, changes)
         configuration = Configuration(changed, self.design(changed), dict(changes))
         if "schedule" not in changes:
             return configuration
-        return replace(configuration, plan=self._plan(configuration, self._time))
+        return replace(configuration, plan=self._plan(configuration, self.time))
 
-    def _plan(self, start: Configuration[P, D], over: float) -> Plan[P, D]:
-        """What the schedule of `start` brings after a time (ns), designed in turn.
+    def stage(self, changes: Mapping[str, Any]) -> Configuration[P, D]:
+        """Validate a change of parameters and design for it, without effect yet.
 
         Raises:
-            ConfigurationError: what it brings is not allowed, or is to come before that time and does not
-                stand in the schedule in force.
+            ConfigurationError: the change is not allowed, or the design fails; nothing has changed.
         """
-        plan, latest = [], start
-        for entry in sorted(start.parameters.schedule, key=lambda entry: scheduled(entry)[0]):
-            at, changes = scheduled(entry)
-            if at > over:
-                latest = self._design_from(latest.parameters, changes)
-                plan.append((at, latest))
-            elif entry not in self.parameters.schedule:
-                raise ParameterError(
-                    f"parameter schedule: {entry!r} is not allowed; its time must be above "
-                    f"{over / NANOSECONDS:g} s, which is now"
-                )
-        return tuple(plan)
+        waiting = tuple(self._committed)
+        staged = self.derive(self.parameters, {**waiting[-1].changes, **changes} if waiting else changes)
+        self.check_staged(staged)
+        return staged
 
-    def commit(self, prepared: Configuration[P, D]) -> None:
-        """Let a prepared configuration take over when the next tick begins."""
-        self._adopted.append(prepared)
+    def commit(self, staged: Configuration[P, D]) -> None:
+        """Queue a staged configuration, to take effect when the next tick begins."""
+        self._committed.append(staged)
 
     def begin_tick(self, time: int) -> None:
-        """Let a change take over that is due at this tick: first a scheduled one, then an adopted one.
+        """Make the changes due at `time` (ns): scheduled ones, then committed ones.
 
-        Time that runs backwards is a new run: what the schedule has changed is as it was at the start, what
-        was adopted stays, unless the schedule does not go with it from the start.
+        Time that runs backwards starts a new run, with the schedule of the start. Committed changes are kept
+        in it, unless that schedule is not allowed together with them.
         """
-        if time < self._time:
+        if time < self.time:
             try:
-                self._start()
+                self._begin_run()
             except ConfigurationError as rejection:
-                self._changes.clear()
-                self._start()
+                self._kept.clear()
+                self._begin_run()
                 self.log(time, EventKind.REJECTED, str(rejection))
-        self._time = time
-        while self.foreseen and self.foreseen[0][0] <= time:
-            (_, due), *later = self.foreseen
-            self.foreseen = tuple(later)
-            self._let_take_over(time, due)
-        while self._adopted:
-            adopted = self._adopted.popleft()
-            if self._let_take_over(time, adopted):
-                self._changes |= adopted.changes
-
-    def _let_take_over(self, time: int, due: Configuration[P, D]) -> bool:
-        """Swap, if that is still allowed."""
-        try:
-            # What was designed beforehand holds only if nothing else has changed since.
-            changed = change(self.parameters, due.changes)
-            if changed != due.parameters or any(at <= time for at, _ in due.plan):
-                due = self._design_from(self.parameters, due.changes)
-        except ConfigurationError as rejection:  # only now, together with what was changed since it was prepared
-            self.log(time, EventKind.REJECTED, str(rejection))
-            return False
-        self._swap(time, due)
-        return True
-
-    def _swap(self, time: int, new: Configuration[P, D]) -> None:
-        old, self.configuration = self.configuration, new
-        if "schedule" in new.changes:
-            self.foreseen = new.plan
-        self.activate(old, new)
-        before, after = dump(old.parameters), dump(new.parameters)
-        changes = [ParameterChange(name, to_json(before[name]), to_json(after[name])) for name in new.changes]
-        detail = ", ".join(f"{name}: {_text(before[name])} -> {_text(after[name])}" for name in new.changes)
-        self.log(time, EventKind.PARAMETERS, detail, changes=changes)
+        self.time = time
+        while self.pending and self.pending[0][0] <= time:
+            (_, due), *later = self.pending
+            self.pending = tuple(later)
+            self._apply(time, due)
+        while self._committed:
+            committed = self._committed.popleft()
+            if self._apply(time, committed):
+                self._kept |= committed.changes
 
     def log(
         self,
@@ -203,29 +177,66 @@ class FlightModule[P: ModuleParameters, D](ABC):
 
     def scheduled_changes(self, time: int) -> list[dict[str, str]]:
         """New values by name, as their events will have them, of the scheduled changes due by a time (ns)."""
-        due = [configuration for at, configuration in self.foreseen if at <= time]
+        due = [configuration for at, configuration in self.pending if at <= time]
         after = [dump(each.parameters) for each in due]
         return [{name: to_json(values[name]) for name in each.changes} for each, values in zip(due, after, strict=True)]
 
     def take_events(self) -> list[Event]:
-        """The events noted since they were last taken."""
+        """The events logged since the last call."""
         events, self.events = self.events, []
         return events
 
+    def _begin_run(self) -> None:
+        parameters = change(self._initial, self._kept)
+        self.time = 0
+        self.configuration = Configuration(parameters, self.design(parameters), {})
+        self.reset()
+        self.pending = self._plan(self.configuration, -math.inf)
 
-def scheduled(entry: str) -> tuple[int, dict[str, Any]]:
-    """Time (ns) and changes of one entry of a schedule; raises ParameterError when it cannot be read."""
-    try:
-        changes = read_yaml(entry)
-        at = round(float(changes.pop("at")) * NANOSECONDS)
-    except (yaml.YAMLError, AttributeError, KeyError, TypeError, ValueError, OverflowError):
-        raise ParameterError(
-            f"parameter schedule: {entry!r} is not allowed; "
-            "it must be like '{at: 3000.0, algorithm: coast}' with the time in seconds"
-        ) from None
-    if "schedule" in changes:
-        raise ParameterError(f"parameter schedule: {entry!r} is not allowed; it must not change itself")
-    return at, {str(name): value for name, value in changes.items()}
+    def _plan(self, start: Configuration[P, D], now: float) -> Plan[P, D]:
+        """Design for the schedule of `start` after a time (ns), one change on top of the other.
+
+        Raises:
+            ConfigurationError: a scheduled change is not allowed, or is neither in the future nor in the
+                schedule in force.
+        """
+        planned, latest = [], start
+        for each in parse_schedule(start.parameters.schedule):
+            if each.time > now:
+                latest = self.derive(latest.parameters, each.changes)
+                planned.append((each.time, latest))
+            elif each.entry not in self.parameters.schedule:
+                raise ParameterError(
+                    f"parameter schedule: {each.entry!r} is not allowed; its time must be above "
+                    f"{now / NANOSECONDS:g} s, which is now"
+                )
+        plan = tuple(planned)
+        self.check_plan(start, plan)
+        return plan
+
+    def _apply(self, time: int, due: Configuration[P, D]) -> bool:
+        """Make a change at a tick, or log its rejection; returns whether it was made."""
+        try:
+            self.check_due(time, due)
+            # The design made in advance holds only if nothing else has changed since.
+            changed = change(self.parameters, due.changes)
+            if changed != due.parameters or any(at <= time for at, _ in due.plan):
+                due = self.derive(self.parameters, due.changes)
+        except ConfigurationError as rejection:
+            self.log(time, EventKind.REJECTED, str(rejection))
+            return False
+        self._swap(time, due)
+        return True
+
+    def _swap(self, time: int, new: Configuration[P, D]) -> None:
+        old, self.configuration = self.configuration, new
+        if "schedule" in new.changes:
+            self.pending = new.plan
+        self.activate(old, new)
+        before, after = dump(old.parameters), dump(new.parameters)
+        changes = [ParameterChange(name, to_json(before[name]), to_json(after[name])) for name in new.changes]
+        detail = ", ".join(f"{name}: {_text(before[name])} -> {_text(after[name])}" for name in new.changes)
+        self.log(time, EventKind.PARAMETERS, detail, changes=changes)
 
 
 def _text(value: Any) -> str:

@@ -1,61 +1,78 @@
-"""Brings together what belongs to one tick: by stamp, never by order of arrival."""
+"""Synchronization of several topics by stamp, never by order of arrival."""
 
 from collections import OrderedDict
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Protocol
 
-MEMORY = 64
-"""Stamps remembered of a topic: one that pauses for longer finds the others lost for a tick."""
+HISTORY = 64
+"""Stamps kept per topic. A topic that falls further behind finds the others missing for one tick."""
+
+
+class Stamped(Protocol):
+    """A record with a stamp."""
+
+    time: int
+    """ns."""
 
 
 class StampSynchronizer:
-    """Records of several topics that are to have one stamp.
+    """Collects the records of several topics that have the same stamp.
 
-    The first topic sets the pace. A record of its that finds somebody without one at its last stamp does
-    without them; else it waits. So one silent satellite costs the others one tick, and whoever speaks again
-    is waited for from the next tick on, in whatever order their records come. Only the first `needed` topics
-    are never done without. Stamps that run backwards are those of a new run, and it begins as the first did.
+    The first topic sets the pace. At each new stamp of it, an optional topic without a record at the previous
+    stamp counts as missing, and is not waited for; one with a record is. So a silent satellite delays the
+    others by one tick, and is waited for again from the tick after it resumed, in whatever order records
+    arrive. The first `needed` topics are always waited for. A pacing stamp that runs backwards starts a new
+    run, with nothing missing.
     """
 
     def __init__(self, topics: Sequence[str], needed: int) -> None:
-        """Wait for these topics; the first `needed` (one or more) are indispensable."""
-        self._heard = {topic: OrderedDict[int, Any]() for topic in topics}
-        self._pace, self._dispensable = topics[0], tuple(topics[needed:])
-        self._lost: frozenset[str] = frozenset()
-        self._now: int | None = None
-        self._answered: int | None = None
+        """Synchronize these topics, of which the first `needed` (at least one) are required."""
+        self._received = {topic: OrderedDict[int, Stamped]() for topic in topics}
+        self._pacing, self._optional = topics[0], tuple(topics[needed:])
+        self._missing: frozenset[str] = frozenset()
+        self._current: int | None = None
+        """Latest stamp of the pacing topic, ns."""
+        self._completed: int | None = None
+        """Latest stamp at which all records were returned, ns."""
 
-    def take(self, topic: str, record: Any) -> list[Any] | None:
-        """Take a record in; once per stamp, the records of all topics in order, None for who is lost."""
-        time, heard = record.time, self._heard[topic]
-        if heard and time < _last(heard):
-            heard.clear()
-        if topic == self._pace and time != self._now:
-            if self._now is not None and time < self._now:
-                self._begin_again(time)
-            elif self._dispensable and self._now is not None:
-                self._lost = frozenset(each for each in self._dispensable if self._now not in self._heard[each])
-            self._now = time
-        heard[time] = record
-        if len(heard) > MEMORY:
-            heard.popitem(last=False)
-        now = self._now
-        if now is None or now == self._answered:
+    def take(self, topic: str, record: Stamped) -> list[Any] | None:
+        """Add a record; once per stamp returns the records of all topics, each of its topic's own type.
+
+        Returns:
+            In the order of topics, None for a missing one; None in place of the list while records are awaited.
+        """
+        time, received = record.time, self._received[topic]
+        if received and time < _latest(received):
+            received.clear()
+        if topic == self._pacing and time != self._current:
+            self._advance(time)
+        received[time] = record
+        if len(received) > HISTORY:
+            received.popitem(last=False)
+        current = self._current
+        if current is None or current == self._completed:
             return None
-        records = [None if each in self._lost else told.get(now) for each, told in self._heard.items()]
-        if records.count(None) > len(self._lost):
+        records = [None if each in self._missing else of.get(current) for each, of in self._received.items()]
+        if records.count(None) > len(self._missing):
             return None
-        self._answered = now
+        self._completed = current
         return records
 
-    def _begin_again(self, time: int) -> None:
-        """Forget who was lost, and what was said by those who have not begun again yet."""
-        self._lost, self._answered = frozenset(), None
-        for told in self._heard.values():
-            if told and _last(told) > time:
-                told.clear()
+    def _advance(self, time: int) -> None:
+        """Go to a new stamp (ns) of the pacing topic."""
+        previous, self._current = self._current, time
+        if previous is not None and time < previous:
+            self._restart(time)
+        elif self._optional and previous is not None:
+            self._missing = frozenset(each for each in self._optional if previous not in self._received[each])
+
+    def _restart(self, time: int) -> None:
+        """Start a new run at a stamp (ns), without the records that topics have left from the previous run."""
+        self._missing, self._completed = frozenset(), None
+        for received in self._received.values():
+            if received and _latest(received) > time:
+                received.clear()
 
 
-def _last(heard: OrderedDict[int, Any]) -> int:
-    last: int = next(reversed(heard))
-    return last
+def _latest(received: OrderedDict[int, Stamped]) -> int:
+    return next(reversed(received))

@@ -1,1 +1,1 @@
-"""Formations, target propagation, slot assignment."""
+"""Guidance: formations, target paths, slot assignment, predicted separations."""

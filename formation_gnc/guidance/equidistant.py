@@ -1,4 +1,4 @@
-"""Constant distances."""
+"""Equidistant formation."""
 
 import math
 
@@ -10,12 +10,14 @@ from formation_gnc.types import Vector
 
 
 class Equidistant(Ring):
-    """The distances between the satellites, and to the chief, are constant in time.
+    """Constant distances between the satellites, and to the chief.
 
-    They are those of a regular polygon of radius `size`, 2 size sin(pi j / satellites) between places j
-    apart: not equal to one another, despite the name. The polygon turns in the plane z = -sqrt(3) x.
-    Force-free under Hill's equations. Source: Kremmydas (4.3), with the sign of z'_0 of his listing, minus:
-    with the plus of the text the orbit is centred on twice the start (docs/theory/errata.md).
+    The slots form a regular polygon of radius `size`, which turns in the plane z = -sqrt(3) x: slots j apart
+    are at the distance 2 size sin(pi j / satellites), so the distances are constant, but not equal. Force-free
+    under Hill's equations.
+
+    Source: Kremmydas (4.3), with the minus sign of z'_0 of his listing. With the plus sign of the text the
+    orbit is centred on twice the start (docs/theory/errata.md).
     """
 
     @staticmethod

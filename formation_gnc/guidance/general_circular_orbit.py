@@ -1,4 +1,4 @@
-"""A circle in space."""
+"""General circular orbit."""
 
 import math
 
@@ -9,11 +9,10 @@ from formation_gnc.types import Vector
 
 
 class GeneralCircularOrbit(Ring):
-    """The satellites go round the chief at a constant distance: x^2 + y^2 + z^2 = size^2.
+    """Relative orbit at a constant distance from the chief: x^2 + y^2 + z^2 = size^2.
 
-    The circle lies in the plane z = sqrt(3) x, one of the two in which Hill's equations allow it;
-    `Equidistant` has the other. Force-free under Hill's equations: x = (size / 2) sin(phase),
-    y = size cos(phase).
+    A circle in the plane z = sqrt(3) x, one of the two planes in which Hill's equations have one; `Equidistant`
+    has the other. Force-free under Hill's equations: x = (size / 2) sin(phase), y = size cos(phase).
     """
 
     @staticmethod

@@ -1,4 +1,4 @@
-"""A circle as seen along the track."""
+"""Helix."""
 
 import numpy as np
 
@@ -8,11 +8,12 @@ from formation_gnc.types import Vector
 
 
 class Helix(Ring):
-    """Across the track the satellites go round a circle: x^2 + z^2 = (size / 2)^2.
+    """Relative orbit that projects to a circle in the radial/cross-track plane: x^2 + z^2 = (size / 2)^2.
 
-    So they never come nearer to the chief's track than half their size, wherever they are along it: what an
-    error along the track, the likeliest one, cannot undo. Force-free under Hill's equations. Source:
-    Kremmydas, listing cw_helix.
+    The satellites keep half of `size` from the chief's track wherever they are along it. Along-track errors,
+    which grow most, do not reduce that distance. Force-free under Hill's equations.
+
+    Source: Kremmydas, listing cw_helix.
     """
 
     @staticmethod

@@ -1,4 +1,4 @@
-"""One behind the other."""
+"""Leader-follower formation."""
 
 from dataclasses import dataclass
 
@@ -11,33 +11,34 @@ from formation_gnc.types import Matrix, Vector
 
 @dataclass(frozen=True)
 class LeaderFollowerParameters:
-    """Where the follower flies."""
+    """Separation along the track."""
 
     separation: float = parameter(
         100.0,
         unit="m",
         in_flight=True,
-        doc="distance from one to the next along the track; negative flies ahead",
+        doc="along-track distance from each satellite to the next; negative for ahead of the chief",
     )
 
 
-class LeaderFollower(Formation):
-    """At rest behind the chief on its track, place k at [0, -(k + 1) separation, 0, 0, 0, 0].
+class LeaderFollower(Formation[LeaderFollowerParameters]):
+    """At rest behind the chief on its track, slot k at [0, -(k + 1) separation, 0, 0, 0, 0].
 
-    An equilibrium of Hill's equations, so it needs no thrust about a circular chief (Roberts, leader-follower
-    of MUSTANG).
+    An equilibrium of Hill's equations, and so force-free about a circular chief.
+
+    Source: Roberts, leader-follower of MUSTANG.
     """
 
     Parameters = LeaderFollowerParameters
 
     def __init__(self, parameters: LeaderFollowerParameters, mean_motion: float, slot: int = 0) -> None:
-        """Any separation will do."""
+        """Any separation is allowed."""
         self._state = np.array([[0.0, -(slot + 1) * parameters.separation, 0.0, 0.0, 0.0, 0.0]])
 
     @staticmethod
-    def places(parameters: LeaderFollowerParameters) -> None:
-        """As many as one likes, each behind the last."""
+    def slot_count(parameters: LeaderFollowerParameters) -> None:
+        """Unlimited."""
 
     def states(self, times: Vector) -> Matrix:
-        """The same state at all times."""
+        """(N, 6), the same state at all times."""
         return self._state.repeat(len(times), axis=0)

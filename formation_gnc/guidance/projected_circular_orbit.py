@@ -1,4 +1,4 @@
-"""A circle as seen from the Earth."""
+"""Projected circular orbit."""
 
 import numpy as np
 
@@ -8,10 +8,11 @@ from formation_gnc.types import Vector
 
 
 class ProjectedCircularOrbit(Ring):
-    """Along-track and cross-track the satellites go round a circle: y^2 + z^2 = size^2.
+    """Relative orbit that projects to a circle in the along-track/cross-track plane: y^2 + z^2 = size^2.
 
-    Radially they swing by half of it: x = (size / 2) sin(phase) with y = size cos(phase), z = size
-    sin(phase). Force-free under Hill's equations. Source: Kremmydas, listing cw_pco.
+    x = (size / 2) sin(phase), y = size cos(phase), z = size sin(phase). Force-free under Hill's equations.
+
+    Source: Kremmydas, listing cw_pco.
     """
 
     @staticmethod

@@ -1,4 +1,6 @@
-"""All formations by name: a new formation is one file and one line here."""
+"""Registry of formations: a new formation is one file and one entry here."""
+
+from typing import Any
 
 from formation_gnc.guidance.equidistant import Equidistant
 from formation_gnc.guidance.formation import Formation
@@ -12,7 +14,7 @@ from formation_gnc.guidance.slot_list import SlotList
 from formation_gnc.guidance.tetrahedral import Tetrahedral
 from formation_gnc.guidance.three_in_plane_one_out import ThreeInPlaneOneOut
 
-FORMATIONS: dict[str, type[Formation]] = {
+FORMATIONS: dict[str, type[Formation[Any]]] = {
     "leader_follower": LeaderFollower,
     "relative_orbit": RelativeOrbit,
     "projected_circular_orbit": ProjectedCircularOrbit,

@@ -1,4 +1,4 @@
-"""The parametrised relative orbit of Joshi."""
+"""Parametrised relative orbit."""
 
 from dataclasses import dataclass
 
@@ -11,34 +11,36 @@ from formation_gnc.types import Matrix, Vector
 
 @dataclass(frozen=True)
 class RelativeOrbitParameters:
-    """The six constants of a relative orbit, named as in the source."""
+    """The six constants of the relative orbit, named as by Joshi."""
 
     rho: float = parameter(
-        1000.0, unit="m", minimum=0.0, in_flight=True, doc="radial amplitude; twice that along-track"
+        1000.0, unit="m", minimum=0.0, in_flight=True, doc="radial amplitude, half of the along-track one"
     )
     theta: float = parameter(0.0, unit="rad", in_flight=True, doc="phase at the start of the run")
-    a: float = parameter(0.0, unit="m", in_flight=True, doc="radial offset; makes the orbit drift along-track")
+    a: float = parameter(0.0, unit="m", in_flight=True, doc="radial offset, which makes the orbit drift along-track")
     b: float = parameter(0.0, unit="m", in_flight=True, doc="along-track offset")
-    m: float = parameter(0.0, in_flight=True, doc="slope of the cross-track motion in phase with the radial one")
-    n: float = parameter(0.0, in_flight=True, doc="slope of the cross-track motion in phase with the along-track one")
+    m: float = parameter(0.0, in_flight=True, doc="slope of z with x: z = m x + n y about the centre")
+    n: float = parameter(0.0, in_flight=True, doc="slope of z with y: z = m x + n y about the centre")
 
 
-class RelativeOrbit(Formation):
-    """General free solution of Hill's equations (Joshi 4.14-4.19, with the factor omega that 4.17 lacks).
+class RelativeOrbit(Formation[RelativeOrbitParameters]):
+    """General solution of Hill's equations, in one slot.
 
-    Needs no thrust about a circular chief; for any other it is Joshi's desired trajectory, at the constant
-    rate sqrt(mu / a^3).
+    Force-free about a circular chief. About any other it is Joshi's desired trajectory, at the constant rate
+    sqrt(mu / a^3).
+
+    Source: Joshi (4.14)-(4.19), with the factor omega missing in (4.17).
     """
 
     Parameters = RelativeOrbitParameters
 
     def __init__(self, parameters: RelativeOrbitParameters, mean_motion: float, slot: int = 0) -> None:
-        """Any constants will do."""
+        """Any constants are allowed."""
         self._constants = parameters
         self._rate = mean_motion
 
     def states(self, times: Vector) -> Matrix:
-        """States at times (N,), Joshi 4.14-4.19."""
+        """(N, 6) states, Joshi (4.14)-(4.19)."""
         c, omega = self._constants, self._rate
         phase = omega * times + c.theta
         sine, cosine = c.rho * np.sin(phase), c.rho * np.cos(phase)

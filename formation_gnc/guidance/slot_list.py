@@ -1,4 +1,4 @@
-"""Any places one likes."""
+"""Slots from a list of states."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from formation_gnc.types import Vector
 
 @dataclass(frozen=True)
 class SlotListParameters:
-    """The states at time zero."""
+    """The states of the slots at time zero."""
 
     states: tuple[float, ...] = parameter(
         (0.0, -100.0, 0.0, 0.0, 0.0, 0.0),
@@ -20,29 +20,29 @@ class SlotListParameters:
         minimum=-1e9,
         maximum=1e9,
         in_flight=True,
-        doc="state of every place at time zero, six numbers each, Hill frame",
+        doc="states of the slots at time zero, six numbers each, Hill frame",
     )
 
 
-class SlotList(FreeMotion):
-    """Each place moves freely under Hill's equations from the state it is given: what stays is that state.
+class SlotList(FreeMotion[SlotListParameters]):
+    """Slots in free motion under Hill's equations, each from a given state.
 
-    A place drifts along the track by -3 (y' + 2 n x) times the time, as it is told to.
+    A slot drifts along the track at the rate -3 (y' + 2 n x) of its state.
     """
 
     Parameters = SlotListParameters
 
     @staticmethod
-    def places(parameters: SlotListParameters) -> int:
-        """One for every six numbers."""
+    def slot_count(parameters: SlotListParameters) -> int:
+        """One per six numbers."""
         return len(parameters.states) // 6
 
-    @staticmethod
-    def start(parameters: SlotListParameters, mean_motion: float, slot: int) -> Vector:
-        """The state given for the place; raises ConfigurationError when the list has part of one."""
+    @classmethod
+    def start(cls, parameters: SlotListParameters, mean_motion: float, slot: int) -> Vector:
+        """The state given for the slot; raises ConfigurationError for an empty list, or part of a state."""
         count = len(parameters.states)
         if count == 0 or count % 6:
             raise ConfigurationError(
-                f"parameter slot_list.states: {count} numbers are not allowed; it must be six for each place"
+                f"parameter slot_list.states: {count} numbers are not allowed; it must be six for each slot"
             )
         return np.array(parameters.states[6 * slot : 6 * slot + 6])

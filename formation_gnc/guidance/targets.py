@@ -1,9 +1,10 @@
-"""How a formation is carried forward in time: the relative-motion models that a target can move by."""
+"""Target paths: formations propagated by relative-motion models."""
 
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -26,18 +27,18 @@ from formation_gnc.relative.tschauner_hempel import TschaunerHempelModel
 from formation_gnc.types import Matrix, Vector
 
 CHECKS = 24
-"""Points of a revolution at which the error of a model is looked at."""
+"""Intervals of a revolution between the points at which the error of a path is computed."""
 
 
 class TargetPath(ABC):
-    """Where a deputy is to be at any time of the run: a formation that starts at a phase, in one model.
+    """Target of a deputy at any time of the run: a formation from a phase at time zero, propagated by one model.
 
-    The phase belongs to the run's time zero, not to that of a change: whoever is sent to another formation,
-    size or place meets the others there.
+    The phase refers to time zero of the run, not to the time of a change. So deputies that change formation,
+    size or slot at different times are in formation again.
     """
 
-    def __init__(self, formation: Formation, phase: float, common: CommonParameters) -> None:
-        """Carry `formation`, made for the common's mean motion, forward from `phase` (rad) at time zero."""
+    def __init__(self, formation: Formation[Any], phase: float, common: CommonParameters) -> None:
+        """Propagate `formation`, prepared for the mean motion of `common`, from `phase` (rad) at time zero."""
         self._formation, self._phase, self._common = formation, phase, common
         self._ahead = phase / common.mean_motion
 
@@ -46,20 +47,19 @@ class TargetPath(ABC):
         """(N, 6) target states, Hill frame, m and m/s, at times (N,) in s since the start of the run."""
 
     def coast(self, states: Matrix, time: float, ahead: Vector) -> Matrix:
-        """(K, N, 6) where satellites in states (N, 6) at a time (s) move freely in the model, after times
-        (K,) s."""
+        """(K, N, 6) states of free motion in the model from states (N, 6) at a time (s), after times (K,) s."""
         moved: Matrix = (self._transitions(time, ahead) @ states.T).swapaxes(1, 2)
         return moved
 
     @abstractmethod
     def _transitions(self, time: float, ahead: Vector) -> Matrix:
-        """(K, 6, 6) from a time (s) to times (K,) s after it."""
+        """(K, 6, 6) transition matrices from a time (s) to times (K,) s after it."""
 
     def error(self) -> tuple[float, float]:
-        """What the model is off by, and the size of the path: m, both the greatest over the first revolution.
+        """Largest error and largest distance of the path over the first revolution, m.
 
-        Off from two satellites about a point mass, in closed form, of which the deputy starts on the path. So
-        it shows what linearisation leaves out, and an eccentricity that the model does not know.
+        The error is against two-body motion of chief and deputy in closed form, with the deputy starting on the
+        path. It covers linearisation, and an eccentricity that the model neglects.
 
         Raises:
             ConfigurationError: the path starts on no orbit about the Earth.
@@ -72,11 +72,11 @@ class TargetPath(ABC):
             deputy = elements_from_state(inertial_from_relative(inertial, path[0]))
         except ConfigurationError as reason:
             raise ConfigurationError(f"this formation starts on no orbit about the Earth: {reason}") from None
-        flown = np.array(
+        exact = np.array(
             [relative_from_inertial(_advanced(chief, float(t)), _advanced(deputy, float(t))) for t in times]
         )
-        distances = np.linalg.norm(flown[:, :3] - path[:, :3], axis=1)
-        return float(distances.max()), float(np.linalg.norm(path[:, :3], axis=1).max())
+        errors = np.linalg.norm(exact[:, :3] - path[:, :3], axis=1)
+        return float(errors.max()), float(np.linalg.norm(path[:, :3], axis=1).max())
 
 
 def _advanced(orbit: Elements, time: float) -> Vector:
@@ -131,7 +131,7 @@ class YamanakaAnkersenPath(_StartedPath):
     along the track and across it the path is drawn out with the chief's distance.
     """
 
-    def __init__(self, formation: Formation, phase: float, common: CommonParameters) -> None:
+    def __init__(self, formation: Formation[Any], phase: float, common: CommonParameters) -> None:
         """Start at the chief's anomaly at time zero."""
         super().__init__(formation, phase, common)
         chief = KeplerChief.of(Elements(**vars(common.chief)))
@@ -160,7 +160,7 @@ class J2MeanMotionModel(HarmonicModel):
     anomaly_rate: float
 
     @classmethod
-    @cache  # sharing places out asks for hundreds of paths about one chief
+    @cache  # slot assignment makes hundreds of paths about one chief
     def of(cls, osculating: Elements) -> "J2MeanMotionModel":
         """The rates of a chief with these osculating elements."""
         _, perigee, anomaly = secular_rates(mean_elements(osculating))
@@ -175,7 +175,7 @@ class J2MeanMotionModel(HarmonicModel):
 class J2MeanMotionPath(_StartedPath):
     """Free motion at the mean rates under J2: the phase keeps up with the truth, the shape shears with it."""
 
-    def __init__(self, formation: Formation, phase: float, common: CommonParameters) -> None:
+    def __init__(self, formation: Formation[Any], phase: float, common: CommonParameters) -> None:
         """Start at the phase at time zero."""
         super().__init__(formation, phase, common)
         self._model = J2MeanMotionModel.of(Elements(**vars(common.chief)))

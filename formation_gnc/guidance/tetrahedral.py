@@ -1,4 +1,4 @@
-"""A tetrahedron of constant volume."""
+"""Tetrahedral formation."""
 
 import math
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from formation_gnc.types import Vector
 
 @dataclass(frozen=True)
 class TetrahedralParameters:
-    """How large the tetrahedron is."""
+    """Size of the tetrahedron."""
 
     size: float = parameter(
         1000.0,
@@ -20,30 +20,31 @@ class TetrahedralParameters:
         above=0.0,
         maximum=1e9,
         in_flight=True,
-        doc="half the distance of the two satellites that stay on the chief's track",
+        doc="half the distance between the two satellites at rest on the chief's track",
     )
 
 
-class Tetrahedral(FreeMotion):
-    """Places 2 and 3 stay `size` behind and ahead of the chief; 0 and 1 go round it at constant volume.
+class Tetrahedral(FreeMotion[TetrahedralParameters]):
+    """Tetrahedron of constant volume: slots 2 and 3 at rest `size` behind and ahead of the chief, 0 and 1 around it.
 
-    The volume is 2 sqrt(2) / (9 sqrt(3)) size A^2 with A = 3 sqrt(3) / 20 size, the scale of the motion of 0
-    and 1. Force-free under Hill's equations. Source: Kremmydas (4.4)-(4.6) and listing tetrahedral, of which
-    the listing's y_0 are right: -sqrt(3) A for place 0 and A / sqrt(3) for place 1. With the text's sqrt(3) A
-    for both the volume passes through zero. The text takes A of the whole length between the two on the
-    track, the listing of its half, as here.
+    The volume is 2 sqrt(2) / (9 sqrt(3)) size A^2 with A = 3 sqrt(3) / 20 size, the scale of the motion of
+    slots 0 and 1. Force-free under Hill's equations.
+
+    Source: Kremmydas (4.4)-(4.6) and listing tetrahedral, with the y_0 of the listing: -sqrt(3) A for slot 0
+    and A / sqrt(3) for slot 1. With the text's sqrt(3) A for both, the volume passes through zero. A is taken
+    of half the distance between slots 2 and 3, as in the listing; the text takes it of the whole.
     """
 
     Parameters = TetrahedralParameters
 
     @staticmethod
-    def places(parameters: TetrahedralParameters) -> int:
+    def slot_count(parameters: TetrahedralParameters) -> int:
         """Four."""
         return 4
 
-    @staticmethod
-    def start(parameters: TetrahedralParameters, mean_motion: float, slot: int) -> Vector:
-        """The states of Kremmydas' listing, his satellites 1 to 4."""
+    @classmethod
+    def start(cls, parameters: TetrahedralParameters, mean_motion: float, slot: int) -> Vector:
+        """The state of Kremmydas' satellite slot + 1, as in his listing."""
         size, n = parameters.size, mean_motion
         a = 3.0 * math.sqrt(3.0) / 20.0 * size
         down = 2.0 * math.sqrt(2.0) / 3.0 * a

@@ -1,4 +1,4 @@
-"""Three satellites round the chief in its orbit plane, and one that swings through it."""
+"""Three in plane, one out."""
 
 import math
 from dataclasses import dataclass
@@ -13,36 +13,38 @@ from formation_gnc.types import Vector
 
 @dataclass(frozen=True)
 class ThreeInPlaneOneOutParameters:
-    """The ellipse and the swing."""
+    """The in-plane ellipse, and the cross-track oscillation."""
 
     size: float = parameter(
-        1000.0, unit="m", above=0.0, maximum=1e9, in_flight=True, doc="along-track half axis of the ellipse"
+        1000.0, unit="m", above=0.0, maximum=1e9, in_flight=True, doc="along-track semi-axis of the ellipse"
     )
     height: float = parameter(
-        600.0, unit="m", above=0.0, maximum=1e9, in_flight=True, doc="amplitude of the swing across the plane"
+        600.0, unit="m", above=0.0, maximum=1e9, in_flight=True, doc="cross-track amplitude of slot 3"
     )
 
 
-class ThreeInPlaneOneOut(FreeMotion):
-    """Places 0 to 2 are a third of a revolution apart on (2 x)^2 + y^2 = size^2, z = 0; place 3 swings.
+class ThreeInPlaneOneOut(FreeMotion[ThreeInPlaneOneOutParameters]):
+    """Slots 0 to 2 in the orbit plane, a third of a revolution apart on (2 x)^2 + y^2 = size^2; slot 3 out of plane.
 
-    The three make a triangle of constant area, 3 sqrt(3) / 8 size^2, centred on the chief, which is a point
-    here and no satellite: place 3, with z^2 + (z' / n)^2 = height^2, passes through it twice in a revolution.
-    Force-free under Hill's equations. Source: Kremmydas (4.1), (4.2) and listing cw_plane_1out. Of the two,
-    right are the listing's sign of z'_0, minus, and the text's y'_0 of place 3, zero: with the listing's 0.8
-    m/s at the same y_0 the amplitude is sqrt(y_0^2 + (0.8 / n)^2), more than 750 m whatever y_0 is.
+    Slots 0 to 2 form a triangle of constant area, 3 sqrt(3) / 8 size^2, centred on the chief. Slot 3, with
+    z^2 + (z' / n)^2 = height^2, passes through the chief's position twice a revolution, so the chief is no
+    satellite here. Force-free under Hill's equations.
+
+    Source: Kremmydas (4.1), (4.2) and listing cw_plane_1out, with the listing's minus sign of z'_0 and the
+    text's y'_0 = 0 of slot 3. With the listing's y'_0 = 0.8 m/s the amplitude is sqrt(y_0^2 + (0.8 / n)^2),
+    above 750 m for any y_0.
     """
 
     Parameters = ThreeInPlaneOneOutParameters
 
     @staticmethod
-    def places(parameters: ThreeInPlaneOneOutParameters) -> int:
+    def slot_count(parameters: ThreeInPlaneOneOutParameters) -> int:
         """Four."""
         return 4
 
-    @staticmethod
-    def start(parameters: ThreeInPlaneOneOutParameters, mean_motion: float, slot: int) -> Vector:
-        """Place 0 ahead of the chief, place 3 at the end of its swing."""
+    @classmethod
+    def start(cls, parameters: ThreeInPlaneOneOutParameters, mean_motion: float, slot: int) -> Vector:
+        """Slot 0 ahead of the chief, slot 3 at its cross-track amplitude."""
         if slot == 3:
             return hill_from_lvlh(np.array([0.0, parameters.height, 0.0, 0.0, 0.0, 0.0]))
         size = parameters.size

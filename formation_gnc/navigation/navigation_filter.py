@@ -291,7 +291,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         acquire = self._acquires(measurement)
         if acquire is None:
             return None
-        if acquire and measurement.time < self._time:
+        if acquire and measurement.time < self.time:
             self._rejections = Rejections()  # time runs backwards: a new run
         self.begin_tick(measurement.time)
         if acquire:

@@ -13,7 +13,7 @@ import yaml
 import formation_gnc
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight.graph import GRAPH
-from formation_gnc.guidance.guidance import check_places
+from formation_gnc.guidance.fleet_checks import check_fleet
 from formation_gnc.parameters import dump, load, read_yaml
 from formation_gnc.plant.plant import PlantParameters
 
@@ -74,7 +74,7 @@ def load_scenario(name: str, overrides: Mapping[str, Mapping[str, Any]] | None =
             deputy: {row.name: _load(row.parameters, sections, f"/{deputy}/{row.name}") for row in GRAPH}
             for deputy in plant.deputies
         }
-        check_places({name: modules["guidance"] for name, modules in deputies.items()})
+        check_fleet({name: modules["guidance"] for name, modules in deputies.items()})
     except ConfigurationError as error:
         raise ConfigurationError(f"{path.name}: {error}") from None
     return Scenario(path.stem, plant, deputies)

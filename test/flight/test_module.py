@@ -1,3 +1,5 @@
+"""Parameter changes of a flight module in flight: staged, committed, scheduled, vetoed."""
+
 import json
 from array import array
 from dataclasses import dataclass
@@ -9,7 +11,7 @@ from hypothesis import strategies as st
 
 from formation_gnc.common import Orbit
 from formation_gnc.errors import ConfigurationError, DesignError
-from formation_gnc.flight.module import Configuration, FlightModule, ModuleParameters
+from formation_gnc.flight.module import Configuration, FlightModule, ModuleParameters, Plan
 from formation_gnc.parameters import dump, parameter, to_json
 from formation_gnc.records import EventKind, ParameterChange
 from formation_gnc.types import NANOSECONDS
@@ -27,11 +29,11 @@ class Settings(ModuleParameters):
 
 
 class Amplifier(FlightModule[Settings, float]):
-    """A part whose design can fail, and that keeps a list of what was designed and of who took over."""
+    """A module whose design can fail; keeps a list of its designs and activations."""
 
     def __init__(self, schedule: tuple[str, ...] = (), **values: Any) -> None:
         self.designed: list[tuple[float, float]] = []
-        self.taken_over: list[tuple[float, float]] = []
+        self.activated: list[tuple[float, float]] = []
         super().__init__("/deputy1/amplifier", Settings(chief=ORBIT, schedule=schedule, **values))
 
     def design(self, parameters: Settings) -> float:
@@ -44,10 +46,10 @@ class Amplifier(FlightModule[Settings, float]):
         return self.configuration.design
 
     def activate(self, old: Configuration[Settings, float], new: Configuration[Settings, float]) -> None:
-        self.taken_over.append((old.design, new.design))
+        self.activated.append((old.design, new.design))
 
     def tick(self, second: float) -> float:
-        """The gain that flies at a time in s."""
+        """The gain in force at a time (s)."""
         self.begin_tick(round(second * NANOSECONDS))
         assert self.configuration.design == self.parameters.gain * self.parameters.lag
         return self.parameters.gain
@@ -56,63 +58,61 @@ class Amplifier(FlightModule[Settings, float]):
         return [(event.tick, EventKind(event.kind), event.detail) for event in self.take_events()]
 
 
-def test_a_scheduled_change_takes_over_at_the_first_tick_from_its_time_on() -> None:
-    part = Amplifier(("{at: 2.5, gain: 2}",))
-    assert [part.tick(second) for second in range(5)] == [1.0, 1.0, 1.0, 2.0, 2.0]
-    assert part.logged() == [(3, EventKind.PARAMETERS, "gain: 1.0 -> 2.0")]
-    assert part.taken_over == [(1.0, 2.0)]
+def test_scheduled_change_takes_effect_at_first_tick_from_its_time() -> None:
+    module = Amplifier(("{at: 2.5, gain: 2}",))
+    assert [module.tick(second) for second in range(5)] == [1.0, 1.0, 1.0, 2.0, 2.0]
+    assert module.logged() == [(3, EventKind.PARAMETERS, "gain: 1.0 -> 2.0")]
+    assert module.activated == [(1.0, 2.0)]
 
 
-def test_an_event_says_when_and_whom_it_happened_to() -> None:
-    part = Amplifier(("{at: 3.0, label: b}",))
-    part.tick(3.0)
-    (event,) = part.take_events()
+def test_event_has_stamp_tick_and_node() -> None:
+    module = Amplifier(("{at: 3.0, label: b}",))
+    module.tick(3.0)
+    (event,) = module.take_events()
     assert (event.time, event.tick, event.node) == (3 * NANOSECONDS, 3, "/deputy1/amplifier")
-    assert part.take_events() == []
+    assert module.take_events() == []
 
 
-def test_scheduled_changes_are_designed_before_the_flight_and_not_again_in_it() -> None:
-    part = Amplifier(("{at: 4, gain: 3}", "{at: 2, gain: 2, lag: 2}"))
-    assert part.designed == [(1.0, 1.0), (2.0, 2.0), (3.0, 2.0)]
-    assert [part.tick(second) for second in range(6)] == [1.0, 1.0, 2.0, 2.0, 3.0, 3.0]
-    assert len(part.designed) == 3
+def test_scheduled_changes_are_designed_once_before_the_flight() -> None:
+    module = Amplifier(("{at: 4, gain: 3}", "{at: 2, gain: 2, lag: 2}"))
+    assert module.designed == [(1.0, 1.0), (2.0, 2.0), (3.0, 2.0)]
+    assert [module.tick(second) for second in range(6)] == [1.0, 1.0, 2.0, 2.0, 3.0, 3.0]
+    assert len(module.designed) == 3
 
 
 @given(
     entries=st.lists(st.tuples(st.integers(0, 20), st.integers(0, 10)), max_size=6),
     ticks=st.sets(st.integers(0, 25), min_size=1),
 )
-def test_whatever_ticks_are_flown_the_latest_due_entry_of_the_schedule_holds(
-    entries: list[tuple[int, int]], ticks: set[int]
-) -> None:
-    part = Amplifier(tuple(f"{{at: {at}, gain: {gain}}}" for at, gain in entries))
-    in_order = sorted(entries, key=lambda entry: entry[0])  # stable: of two at one time the later in the list
+def test_latest_due_schedule_entry_holds_at_any_tick(entries: list[tuple[int, int]], ticks: set[int]) -> None:
+    module = Amplifier(tuple(f"{{at: {at}, gain: {gain}}}" for at, gain in entries))
+    in_order = sorted(entries, key=lambda entry: entry[0])  # stable: of two at one time, the later in the list holds
     for tick in sorted(ticks):
         due = [gain for at, gain in in_order if at <= tick]
-        assert part.tick(tick) == (due[-1] if due else 1.0)
-    assert len(part.logged()) == sum(at <= max(ticks) for at, _ in entries)
+        assert module.tick(tick) == (due[-1] if due else 1.0)
+    assert len(module.logged()) == sum(at <= max(ticks) for at, _ in entries)
 
 
-def test_what_is_prepared_has_no_effect_and_what_is_adopted_has_it_at_the_next_tick() -> None:
-    part = Amplifier()
-    part.tick(0)
-    prepared = part.stage({"gain": 5.0})
-    assert part.tick(1) == 1.0
-    part.commit(prepared)
-    assert part.parameters.gain == 1.0
-    assert [part.tick(2), part.tick(3)] == [5.0, 5.0]
-    assert part.logged() == [(2, EventKind.PARAMETERS, "gain: 1.0 -> 5.0")]
-    assert part.taken_over == [(1.0, 5.0)]
+def test_commit_takes_effect_at_next_tick_and_stage_has_none() -> None:
+    module = Amplifier()
+    module.tick(0)
+    staged = module.stage({"gain": 5.0})
+    assert module.tick(1) == 1.0
+    module.commit(staged)
+    assert module.parameters.gain == 1.0
+    assert [module.tick(2), module.tick(3)] == [5.0, 5.0]
+    assert module.logged() == [(2, EventKind.PARAMETERS, "gain: 1.0 -> 5.0")]
+    assert module.activated == [(1.0, 5.0)]
 
 
 def test_two_changes_before_a_tick_both_hold() -> None:
-    part = Amplifier()
-    part.commit(part.stage({"gain": 5.0}))
+    module = Amplifier()
+    module.commit(module.stage({"gain": 5.0}))
     with pytest.raises(DesignError, match="gain 5 is too much at lag 3"):
-        part.stage({"lag": 3.0})  # with what already waits
-    part.commit(part.stage({"lag": 2.0, "label": "b"}))
-    assert part.tick(0) == 5.0
-    assert (part.parameters.lag, part.parameters.label) == (2.0, "b")
+        module.stage({"lag": 3.0})  # with what already waits
+    module.commit(module.stage({"lag": 2.0, "label": "b"}))
+    assert module.tick(0) == 5.0
+    assert (module.parameters.lag, module.parameters.label) == (2.0, "b")
 
 
 @pytest.mark.parametrize(
@@ -131,85 +131,85 @@ def test_two_changes_before_a_tick_both_hold() -> None:
         ({"tick": 2.0}, "parameter tick: cannot change in flight"),
     ],
 )
-def test_a_rejected_change_leaves_everything_as_it_was(changes: dict[str, Any], words: str) -> None:
-    part = Amplifier(("{at: 9, gain: 9}",))
-    part.commit(part.stage({"label": "b"}))
-    before = part.configuration
+def test_rejected_change_has_no_effect(changes: dict[str, Any], words: str) -> None:
+    module = Amplifier(("{at: 9, gain: 9}",))
+    module.commit(module.stage({"label": "b"}))
+    before = module.configuration
     with pytest.raises(ConfigurationError) as rejection:
-        part.stage(changes)
+        module.stage(changes)
     assert str(rejection.value).startswith(words)
-    assert part.configuration is before
-    assert part.tick(1) == 1.0
-    assert part.parameters.label == "b"
-    assert part.logged() == [(1, EventKind.PARAMETERS, "label: a -> b")]
+    assert module.configuration is before
+    assert module.tick(1) == 1.0
+    assert module.parameters.label == "b"
+    assert module.logged() == [(1, EventKind.PARAMETERS, "label: a -> b")]
 
 
-def test_a_change_prepared_before_a_scheduled_one_does_not_undo_it() -> None:
-    part = Amplifier(("{at: 2, gain: 3}",))
-    part.tick(1)
-    slow = part.stage({"lag": 2.0})
-    assert part.tick(2) == 3.0
-    part.commit(slow)
-    assert part.tick(3) == 3.0
-    assert part.parameters.lag == 2.0
+def test_change_staged_before_a_scheduled_one_keeps_it() -> None:
+    module = Amplifier(("{at: 2, gain: 3}",))
+    module.tick(1)
+    slow = module.stage({"lag": 2.0})
+    assert module.tick(2) == 3.0
+    module.commit(slow)
+    assert module.tick(3) == 3.0
+    assert module.parameters.lag == 2.0
 
 
-def test_a_scheduled_change_keeps_what_was_adopted_before_it() -> None:
-    part = Amplifier(("{at: 2, gain: 3}",))
-    part.commit(part.stage({"lag": 2.0}))
-    assert [part.tick(1), part.tick(2)] == [1.0, 3.0]
-    assert part.parameters.lag == 2.0
+def test_scheduled_change_keeps_earlier_committed_change() -> None:
+    module = Amplifier(("{at: 2, gain: 3}",))
+    module.commit(module.stage({"lag": 2.0}))
+    assert [module.tick(1), module.tick(2)] == [1.0, 3.0]
+    assert module.parameters.lag == 2.0
 
 
-def test_a_scheduled_change_that_no_longer_fits_is_rejected_at_its_tick_and_the_flight_goes_on() -> None:
-    part = Amplifier(("{at: 2, gain: 6}", "{at: 4, gain: 2}"))
-    part.commit(part.stage({"lag": 4.0}))
-    assert [part.tick(second) for second in range(6)] == [1.0, 1.0, 1.0, 1.0, 2.0, 2.0]
-    assert part.logged() == [
+def test_scheduled_change_no_longer_allowed_is_rejected_at_its_tick() -> None:
+    module = Amplifier(("{at: 2, gain: 6}", "{at: 4, gain: 2}"))
+    module.commit(module.stage({"lag": 4.0}))
+    assert [module.tick(second) for second in range(6)] == [1.0, 1.0, 1.0, 1.0, 2.0, 2.0]
+    assert module.logged() == [
         (0, EventKind.PARAMETERS, "lag: 1.0 -> 4.0"),
         (2, EventKind.REJECTED, "gain 6 is too much at lag 4"),
         (4, EventKind.PARAMETERS, "gain: 1.0 -> 2.0"),
     ]
 
 
-def test_a_schedule_set_in_flight_takes_the_place_of_what_was_to_come() -> None:
-    part = Amplifier(("{at: 2, gain: 2}", "{at: 4, gain: 4}"))
-    part.tick(3)
-    part.commit(part.stage({"schedule": ["{at: 6, gain: 3}", "{at: 5, lag: 2}"]}))
-    assert [part.tick(second) for second in range(4, 8)] == [4.0, 4.0, 3.0, 3.0]  # due in the tick it came
-    part.commit(part.stage({"schedule": []}))
-    assert part.tick(8) == 3.0
-    assert [detail for _, _, detail in part.logged()][-2:] == [
+def test_schedule_set_in_flight_replaces_pending_changes() -> None:
+    module = Amplifier(("{at: 2, gain: 2}", "{at: 4, gain: 4}"))
+    module.tick(3)
+    module.commit(module.stage({"schedule": ["{at: 6, gain: 3}", "{at: 5, lag: 2}"]}))
+    assert [module.tick(second) for second in range(4, 8)] == [4.0, 4.0, 3.0, 3.0]  # due at the tick it was committed
+    module.commit(module.stage({"schedule": []}))
+    assert module.tick(8) == 3.0
+    assert [detail for _, _, detail in module.logged()][-2:] == [
         "gain: 4.0 -> 3.0",
         'schedule: ["{at: 6, gain: 3}", "{at: 5, lag: 2}"] -> []',
     ]
 
 
-def test_a_schedule_set_in_flight_is_designed_once_and_flown_in_every_new_run() -> None:
-    part = Amplifier(("{at: 2, gain: 2}",))
-    part.tick(3)
-    # what is over may stay in it, for a new run; it is not flown again in this one
-    part.commit(part.stage({"gain": 1.5}))
-    part.tick(4)
-    part.commit(part.stage({"schedule": ["{at: 2, gain: 2}", "{at: 6, lag: 3}"]}))
-    designed = len(part.designed)
-    assert [part.tick(second) for second in (5, 6)] == [1.5, 1.5]
-    assert part.parameters.lag == 3.0
-    assert len(part.designed) == designed
-    assert [part.tick(second) for second in (0, 2, 6)] == [1.5, 2.0, 2.0]
-    assert part.parameters.lag == 3.0
+def test_schedule_set_in_flight_is_designed_once_and_kept_in_new_run() -> None:
+    module = Amplifier(("{at: 2, gain: 2}",))
+    module.tick(3)
+    # a new schedule may keep past entries; they hold again in the next run only
+    module.commit(module.stage({"gain": 1.5}))
+    module.tick(4)
+    module.commit(module.stage({"schedule": ["{at: 2, gain: 2}", "{at: 6, lag: 3}"]}))
+    designed = len(module.designed)
+    assert [module.tick(second) for second in (5, 6)] == [1.5, 1.5]
+    assert module.parameters.lag == 3.0
+    assert len(module.designed) == designed
+    assert [module.tick(second) for second in (0, 2, 6)] == [1.5, 2.0, 2.0]
+    assert module.parameters.lag == 3.0
 
 
-def test_a_schedule_that_comes_too_late_is_rejected_at_its_tick_and_the_old_one_stays() -> None:
-    part = Amplifier(("{at: 9, gain: 9}",))
-    part.tick(3)
+def test_schedule_committed_too_late_is_rejected_and_old_one_stays() -> None:
+    module = Amplifier(("{at: 9, gain: 9}",))
+    module.tick(3)
     with pytest.raises(ConfigurationError, match="must be above 3 s, which is now"):
-        part.stage({"schedule": ["{at: 3, gain: 2}"]})
-    slow = part.stage({"schedule": ["{at: 5, gain: 2}"]})
-    part.tick(4)
-    part.commit(slow)
-    assert [part.tick(second) for second in (5, 8, 9)] == [1.0, 1.0, 9.0]
-    assert [kind for _, kind, _ in part.logged()] == [EventKind.REJECTED, EventKind.PARAMETERS]
+        module.stage({"schedule": ["{at: 3, gain: 2}"]})
+    slow = module.stage({"schedule": ["{at: 5, gain: 2}"]})
+    module.tick(4)
+    module.commit(slow)
+    assert [module.tick(second) for second in (5, 8, 9)] == [1.0, 1.0, 9.0]
+    assert [kind for _, kind, _ in module.logged()] == [EventKind.REJECTED, EventKind.PARAMETERS]
 
 
 @pytest.mark.parametrize(
@@ -222,51 +222,87 @@ def test_a_schedule_that_comes_too_late_is_rejected_at_its_tick_and_the_old_one_
         ("limits", array("d", [1.0, 2.5]), "[1.0, 2.5]"),
     ],
 )
-def test_an_event_has_the_changes_as_json(name: str, value: Any, written: str) -> None:
-    part = Amplifier()
-    old = dump(part.parameters)[name]
-    part.commit(part.stage({name: value}))
-    part.tick(1)
-    (event,) = part.take_events()
+def test_event_has_the_changes_as_json(name: str, value: Any, written: str) -> None:
+    module = Amplifier()
+    old = dump(module.parameters)[name]
+    module.commit(module.stage({name: value}))
+    module.tick(1)
+    (event,) = module.take_events()
     assert event.kind == EventKind.PARAMETERS
     assert event.changes == [ParameterChange(name, to_json(old), written)]
-    assert part.stage({name: json.loads(written)}).parameters == part.parameters
+    assert module.stage({name: json.loads(written)}).parameters == module.parameters
 
 
-def test_time_that_runs_backwards_is_a_new_run_from_the_same_start() -> None:
-    part = Amplifier(("{at: 2, gain: 3}",))
-    first = [part.tick(second) for second in range(4)]
-    told = part.logged()
-    assert [part.tick(second) for second in range(4)] == first == [1.0, 1.0, 3.0, 3.0]
-    assert part.logged() == told
+def test_time_running_backwards_starts_an_equal_run() -> None:
+    module = Amplifier(("{at: 2, gain: 3}",))
+    first = [module.tick(second) for second in range(4)]
+    logged = module.logged()
+    assert [module.tick(second) for second in range(4)] == first == [1.0, 1.0, 3.0, 3.0]
+    assert module.logged() == logged
 
 
-def test_a_new_run_keeps_what_was_adopted_in_the_one_before() -> None:
-    part = Amplifier(("{at: 2, gain: 3}",))
-    part.tick(3)
-    part.commit(part.stage({"label": "b"}))
-    part.tick(4)
-    part.commit(part.stage({"lag": 2.0}))  # still waits when the new run begins
-    assert part.tick(0) == 1.0
-    assert (part.parameters.label, part.parameters.lag) == ("b", 2.0)
-    assert part.tick(2) == 3.0
+def test_new_run_keeps_committed_changes() -> None:
+    module = Amplifier(("{at: 2, gain: 3}",))
+    module.tick(3)
+    module.commit(module.stage({"label": "b"}))
+    module.tick(4)
+    module.commit(module.stage({"lag": 2.0}))  # not in effect yet when the new run begins
+    assert module.tick(0) == 1.0
+    assert (module.parameters.label, module.parameters.lag) == ("b", 2.0)
+    assert module.tick(2) == 3.0
 
 
-def test_a_new_run_drops_what_was_adopted_where_its_schedule_does_not_go_with_that() -> None:
-    part = Amplifier(("{at: 2, gain: 6}",))
-    assert part.tick(3) == 6.0
-    part.commit(part.stage({"gain": 1.0, "lag": 4.0}))
-    assert part.tick(4) == 1.0
-    part.take_events()
-    assert [part.tick(second) for second in (0, 2)] == [1.0, 6.0]
-    assert part.parameters.lag == 1.0
-    assert part.logged()[0] == (0, EventKind.REJECTED, "gain 6 is too much at lag 4")
+def test_new_run_drops_committed_changes_its_schedule_forbids() -> None:
+    module = Amplifier(("{at: 2, gain: 6}",))
+    assert module.tick(3) == 6.0
+    module.commit(module.stage({"gain": 1.0, "lag": 4.0}))
+    assert module.tick(4) == 1.0
+    module.take_events()
+    assert [module.tick(second) for second in (0, 2)] == [1.0, 6.0]
+    assert module.parameters.lag == 1.0
+    assert module.logged()[0] == (0, EventKind.REJECTED, "gain 6 is too much at lag 4")
 
 
-def test_the_same_tick_again_changes_nothing() -> None:
-    part = Amplifier(("{at: 2, gain: 3}",))
-    assert [part.tick(2), part.tick(2)] == [3.0, 3.0]
-    assert len(part.logged()) == 1
+def test_repeated_tick_changes_nothing() -> None:
+    module = Amplifier(("{at: 2, gain: 3}",))
+    assert [module.tick(2), module.tick(2)] == [3.0, 3.0]
+    assert len(module.logged()) == 1
+
+
+class Cautious(Amplifier):
+    """Vetoes gain 7 when staged, gain 8 when due, and gain 9 in a plan."""
+
+    def check_staged(self, staged: Configuration[Settings, float]) -> None:
+        self.veto(staged, 7.0)
+
+    def check_due(self, time: int, due: Configuration[Settings, float]) -> None:
+        self.veto(due, 8.0)
+
+    def check_plan(self, start: Configuration[Settings, float], plan: Plan[Settings, float]) -> None:
+        for _, planned in plan:
+            self.veto(planned, 9.0)
+
+    @staticmethod
+    def veto(configuration: Configuration[Settings, float], gain: float) -> None:
+        if configuration.parameters.gain == gain:
+            raise ConfigurationError(f"gain {gain:g} is vetoed")
+
+
+def test_module_vetoes_a_change_when_staged_when_due_or_in_a_plan() -> None:
+    module = Cautious(("{at: 1, gain: 7}", "{at: 2, gain: 8}"))
+    with pytest.raises(ConfigurationError, match="gain 7 is vetoed"):
+        module.stage({"gain": 7.0})
+    with pytest.raises(ConfigurationError, match="gain 9 is vetoed"):
+        module.stage({"schedule": ["{at: 3, gain: 9}"]})
+    with pytest.raises(ConfigurationError, match="gain 9 is vetoed"):
+        Cautious(("{at: 3, gain: 9}",))
+    module.commit(module.stage({"gain": 8.0}))
+    assert [module.tick(second) for second in (0, 1, 2)] == [1.0, 7.0, 7.0]
+    assert [(tick, kind) for tick, kind, _ in module.logged()] == [
+        (0, EventKind.REJECTED),
+        (1, EventKind.PARAMETERS),
+        (2, EventKind.REJECTED),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -283,7 +319,7 @@ def test_the_same_tick_again_changes_nothing() -> None:
         "{at: 1, gain: 2",
     ],
 )
-def test_an_entry_of_the_schedule_that_makes_no_sense_is_rejected_with_an_example(entry: str) -> None:
+def test_malformed_schedule_entry_is_rejected_with_an_example(entry: str) -> None:
     with pytest.raises(ConfigurationError) as rejection:
         Amplifier((entry,))
     assert str(rejection.value) == (
@@ -302,7 +338,7 @@ def test_an_entry_of_the_schedule_that_makes_no_sense_is_rejected_with_an_exampl
         ("{at: 1, schedule: []}", "parameter schedule: '{at: 1, schedule: []}' is not allowed"),
     ],
 )
-def test_a_scheduled_change_that_is_not_allowed_is_rejected_before_the_flight(entry: str, words: str) -> None:
+def test_forbidden_scheduled_change_is_rejected_before_the_flight(entry: str, words: str) -> None:
     with pytest.raises(ConfigurationError) as rejection:
         Amplifier((entry,))
     assert str(rejection.value).startswith(words)

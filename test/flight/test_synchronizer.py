@@ -1,4 +1,4 @@
-"""What belongs to one stamp comes together, whatever the order in which it arrives."""
+"""Grouping of records by stamp in any order of arrival, with topics that fall silent and resume."""
 
 from dataclasses import dataclass
 from itertools import permutations
@@ -19,63 +19,61 @@ class At:
 
 @pytest.fixture
 def fleet() -> StampSynchronizer:
-    """A satellite and two others, whom it can do without."""
+    """A satellite's own estimate, needed, and those of two neighbours, optional."""
     return StampSynchronizer((OWN, SECOND, THIRD), needed=1)
 
 
-def answers(meeting: StampSynchronizer, *arrivals: tuple[str, int]) -> list[list[int | None]]:
-    """The stamps of what was put together, each time it was."""
-    came = [meeting.take(topic, At(time)) for topic, time in arrivals]
-    return [[each and each.time for each in records] for records in came if records is not None]
+def groups(synchronizer: StampSynchronizer, *arrivals: tuple[str, int]) -> list[list[int | None]]:
+    """Stamps of the groups returned for arrivals of (topic, stamp)."""
+    taken = [synchronizer.take(topic, At(time)) for topic, time in arrivals]
+    return [[each and each.time for each in records] for records in taken if records is not None]
 
 
 @pytest.mark.parametrize("order", list(permutations((OWN, SECOND, THIRD))))
-def test_any_order_of_arrival_gives_one_answer_per_stamp(fleet: StampSynchronizer, order: tuple[str, ...]) -> None:
+def test_any_order_of_arrival_gives_one_group_per_stamp(fleet: StampSynchronizer, order: tuple[str, ...]) -> None:
     arrivals = [(topic, time) for time in (10, 20) for topic in order]
-    assert answers(fleet, *arrivals) == [[10, 10, 10], [20, 20, 20]]
+    assert groups(fleet, *arrivals) == [[10, 10, 10], [20, 20, 20]]
 
 
-def test_a_repeated_record_is_not_answered_again(fleet: StampSynchronizer) -> None:
-    assert len(answers(fleet, (SECOND, 10), (THIRD, 10), (OWN, 10), (OWN, 10), (SECOND, 10))) == 1
+def test_repeated_record_gives_no_second_group(fleet: StampSynchronizer) -> None:
+    assert len(groups(fleet, (SECOND, 10), (THIRD, 10), (OWN, 10), (OWN, 10), (SECOND, 10))) == 1
 
 
-def test_who_is_silent_costs_one_tick_and_is_then_done_without(fleet: StampSynchronizer) -> None:
-    assert answers(fleet, (OWN, 10), (SECOND, 10)) == []
-    # the run goes on: the third was missing, the second was not, and is waited for
-    assert answers(fleet, (OWN, 20)) == []
-    assert answers(fleet, (SECOND, 20)) == [[20, 20, None]]
-    assert answers(fleet, (SECOND, 30), (OWN, 30)) == [[30, 30, None]]
+def test_silent_topic_delays_the_others_by_one_tick_only(fleet: StampSynchronizer) -> None:
+    assert groups(fleet, (OWN, 10), (SECOND, 10)) == []
+    # at the next stamp the third is missing, and the second still waited for
+    assert groups(fleet, (OWN, 20)) == []
+    assert groups(fleet, (SECOND, 20)) == [[20, 20, None]]
+    assert groups(fleet, (SECOND, 30), (OWN, 30)) == [[30, 30, None]]
 
 
-def test_who_speaks_again_is_waited_for_again(fleet: StampSynchronizer) -> None:
-    answers(fleet, (OWN, 10), (SECOND, 10), (OWN, 20), (SECOND, 20))
-    assert answers(fleet, (THIRD, 10)) == []  # of long ago: still lost
-    assert answers(fleet, (OWN, 30), (SECOND, 30)) == [[30, 30, None]]
-    assert answers(fleet, (THIRD, 30), (OWN, 40), (SECOND, 40)) == []
-    assert answers(fleet, (THIRD, 40)) == [[40, 40, 40]]
+def test_topic_that_resumes_is_waited_for_again(fleet: StampSynchronizer) -> None:
+    groups(fleet, (OWN, 10), (SECOND, 10), (OWN, 20), (SECOND, 20))
+    assert groups(fleet, (THIRD, 10)) == []  # of an old stamp: still missing
+    assert groups(fleet, (OWN, 30), (SECOND, 30)) == [[30, 30, None]]
+    assert groups(fleet, (THIRD, 30), (OWN, 40), (SECOND, 40)) == []
+    assert groups(fleet, (THIRD, 40)) == [[40, 40, 40]]
 
 
 @pytest.mark.parametrize("order", list(permutations((OWN, SECOND, THIRD))))
-def test_the_tick_after_a_silence_does_not_hang_on_the_order_either(
-    fleet: StampSynchronizer, order: tuple[str, ...]
-) -> None:
-    answers(fleet, (OWN, 10), (SECOND, 10), (THIRD, 10), (OWN, 20), (THIRD, 20))
-    assert answers(fleet, *((topic, 30) for topic in order)) == [[30, None, 30]]
-    assert answers(fleet, *((topic, 40) for topic in order)) == [[40, 40, 40]]
+def test_order_of_arrival_does_not_matter_after_a_silence(fleet: StampSynchronizer, order: tuple[str, ...]) -> None:
+    groups(fleet, (OWN, 10), (SECOND, 10), (THIRD, 10), (OWN, 20), (THIRD, 20))
+    assert groups(fleet, *((topic, 30) for topic in order)) == [[30, None, 30]]
+    assert groups(fleet, *((topic, 40) for topic in order)) == [[40, 40, 40]]
 
 
-def test_what_is_needed_is_never_done_without() -> None:
+def test_needed_topic_is_always_waited_for() -> None:
     pair = StampSynchronizer(("estimate", "target"), needed=2)
-    assert answers(pair, ("estimate", 10), ("estimate", 20), ("estimate", 30)) == []
-    assert answers(pair, ("target", 30)) == [[30, 30]]
+    assert groups(pair, ("estimate", 10), ("estimate", 20), ("estimate", 30)) == []
+    assert groups(pair, ("target", 30)) == [[30, 30]]
 
 
 @pytest.mark.parametrize("order", list(permutations((OWN, SECOND, THIRD))))
 @pytest.mark.parametrize("last", [{OWN, SECOND, THIRD}, {OWN, SECOND}, {OWN}])
-def test_a_new_run_hears_nothing_of_the_one_before(
+def test_new_run_gets_no_record_of_the_previous_one(
     fleet: StampSynchronizer, order: tuple[str, ...], last: set[str]
 ) -> None:
-    """Wherever that one was left: with everybody there, with one lost, or with none at its last stamp."""
+    """With all topics, one or none of the optional ones at the last stamp of the previous run."""
     for time in (0, 10, 20):
         for topic in order if time < 20 else sorted(last):
             fleet.take(topic, At(time))

@@ -1,4 +1,4 @@
-"""Shortest times and delta-v of transfers, against closed forms and a flown transfer."""
+"""Shortest time and delta-v of transfers, against closed forms."""
 
 import math
 
@@ -18,8 +18,8 @@ errors = st.lists(st.floats(-500.0, 500.0), min_size=6, max_size=6).map(
 
 
 @given(st.floats(0.01, 1.0))
-def test_a_short_way_across_takes_twice_the_root_of_distance_over_acceleration(distance: float) -> None:
-    # bang-bang: half the way faster, half the way slower; over such times the orbit does not matter
+def test_short_cross_track_transfer_takes_the_bang_bang_time(distance: float) -> None:
+    # 2 sqrt(d / a): accelerate half the way, brake the other half; the orbit is negligible over such times
     soonest = shortest_time(np.array([0.0, 0.0, distance, 0.0, 0.0, 0.0]), np.full(3, 1e-2), RATE)
     assert soonest == pytest.approx(2.0 * math.sqrt(distance / 1e-2), rel=0.02)  # found to 0.01, from above
 
@@ -27,30 +27,30 @@ def test_a_short_way_across_takes_twice_the_root_of_distance_over_acceleration(d
 @settings(max_examples=15)
 @given(errors)
 def test_twice_the_thrust_is_never_slower(error: np.ndarray) -> None:
-    # the search is to one per cent
+    # found to one per cent
     assert shortest_time(error, 2.0 * LIMITS, RATE) <= 1.02 * shortest_time(error, LIMITS, RATE)
 
 
-def test_who_is_there_needs_no_time_and_who_cannot_push_never_comes() -> None:
+def test_no_error_takes_no_time_and_no_thrust_never_arrives() -> None:
     assert shortest_time(np.zeros(6), LIMITS, RATE) == 0.0
     assert shortest_time(np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0]), np.array([1e-4, 1e-4, 0.0]), RATE) == math.inf
 
 
-def test_kremmydas_thrusters_take_days() -> None:
-    # 8 uN on 1.5 kg, from a kilometre ahead to the in-plane ellipse of a kilometre: a fifth of a m/s or so
+def test_transfer_with_kremmydas_thrusters_takes_over_a_revolution() -> None:
+    # 8 uN on 1.5 kg, from rest a kilometre ahead to the in-plane ellipse of a kilometre: half a m/s
     error = np.array([0.0, 0.0, 0.0, 0.5 * 1000.0 * RATE, 0.0, 0.0])
     soonest = shortest_time(error, np.full(3, 8e-6 / 1.5), RATE)
     assert 1.0 < soonest * RATE / math.tau < LONGEST
 
 
 @given(errors, st.floats(500.0, 20_000.0), st.floats(0.1, 10.0))
-def test_delta_v_is_in_proportion_to_the_error(error: np.ndarray, duration: float, factor: float) -> None:
+def test_delta_v_is_proportional_to_the_error(error: np.ndarray, duration: float, factor: float) -> None:
     one, other = delta_v(np.array([error, factor * error]), duration, RATE)
     assert other == pytest.approx(factor * one, rel=1e-9)
 
 
 @given(st.floats(-1.0, 1.0))
-def test_over_a_short_time_a_change_of_rate_costs_itself(rate: float) -> None:
-    # across the track, with the position free to be what it gets to: 4 v / T - 6 v t / T^2, 5/3 v of delta-v
+def test_delta_v_of_a_fast_change_of_cross_track_rate(rate: float) -> None:
+    # double integrator: u(t) = 4 v / T - 6 v t / T^2, which sums to 5/3 v
     cost = delta_v(np.array([0.0, 0.0, 0.0, 0.0, 0.0, rate]), 10.0, RATE)
     assert cost == pytest.approx(5.0 / 3.0 * abs(rate), rel=0.01)

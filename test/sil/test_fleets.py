@@ -89,7 +89,7 @@ def test_a_fleet_flies_the_same_bits_on_the_graph_composed_in_process_and_again(
     assert kinds.count(EventKind.ASSIGNMENT) == 8  # at the start and at the change, by each for itself
     assert kinds.count(EventKind.RECONFIGURATION) == 4
     places = [
-        detail.split("place ")[1].split(",")[0]
+        detail.split("slot ")[1].split(",")[0]
         for detail, kind, tick in zip(events["detail"].tolist(), kinds, events["tick"].tolist(), strict=True)
         if kind == EventKind.ASSIGNMENT and tick == 40
     ]
