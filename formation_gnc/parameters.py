@@ -84,7 +84,8 @@ def per_name(names: str) -> Any:
 def per_entry(registry: Mapping[str, Any]) -> Any:
     """Declare a dict of nested schemas: `Parameters` of each entry of a registry, by the entry's name.
 
-    The registry is read at every use: an entry added after import has its parameters like any other.
+    The registry is read at every use: an entry added after import has its parameters like any other. They
+    all have defaults, since a node has the parameters of every entry and uses those of one.
     """
     return dataclasses.field(
         default_factory=lambda: {name: entry.Parameters() for name, entry in registry.items()},
@@ -256,6 +257,6 @@ def change[T](instance: T, changes: Mapping[str, Any]) -> T:
     for leaf in leaves(type(instance), values):
         if leaf.name not in changes or leaf.limits.in_flight:
             continue
-        if leaf.check(changes[leaf.name]) != values[leaf.name]:
+        if leaf.check(changes[leaf.name]) != values.get(leaf.name, leaf.default):
             raise ParameterError(f"parameter {leaf.name}: cannot change in flight; set it at the start")
     return load(type(instance), values | dict(changes))

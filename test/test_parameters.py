@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.parameters import change, dump, leaves, load, parameter, per_name, read_yaml
+from formation_gnc.parameters import change, dump, leaves, load, parameter, per_entry, per_name, read_yaml
 
 
 @dataclass(frozen=True)
@@ -213,3 +213,45 @@ def test_setting_what_is_fixed_to_the_value_it_has_is_no_change() -> None:
 def test_numbers_are_read_as_ros_reads_them(text: str, value: Any) -> None:
     read = read_yaml(text)
     assert (read, type(read)) == (value, type(value))
+
+
+@dataclass(frozen=True)
+class Mast:
+    height: float = parameter(10.0, unit="m", above=0.0, in_flight=True, doc="height")
+
+
+@dataclass(frozen=True)
+class Ground:
+    depth: float = parameter(1.0, unit="m", in_flight=True, doc="depth of the foundation")
+    soil: str = parameter("rock", doc="soil")
+
+
+class OnMast:
+    Parameters = Mast
+
+
+class OnGround:
+    Parameters = Ground
+
+
+MOUNTS: dict[str, Any] = {"mast": OnMast}
+
+
+@dataclass(frozen=True)
+class Site:
+    mount: str = parameter("mast", choices=MOUNTS, in_flight=True, doc="mount in use")
+    mounts: dict[str, Any] = per_entry(MOUNTS)
+
+
+def test_a_schema_has_the_parameters_of_every_registry_entry(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = load(Site, {"mast.height": 3.0})
+    assert before == Site(mounts={"mast": Mast(3.0)})
+    assert Site() == load(Site, {})
+    with pytest.raises(ConfigurationError, match=r"mount: 'ground' is not allowed; it must be one of mast$"):
+        load(Site, {"mount": "ground"})
+    monkeypatch.setitem(MOUNTS, "ground", OnGround)
+    after = change(before, {"mount": "ground", "ground.depth": 2.0, "ground.soil": "rock"})
+    assert dump(after) == {"mount": "ground", "mast.height": 3.0, "ground.depth": 2.0, "ground.soil": "rock"}
+    assert [leaf.name for leaf in leaves(Site, {})] == list(dump(after))
+    with pytest.raises(ConfigurationError, match=r"parameter ground\.soil: cannot change in flight"):
+        change(before, {"ground.soil": "sand"})
