@@ -1,4 +1,4 @@
-"""Compute per tick of the control laws; MPC beside the bare solver, and others, on the same programmes."""
+"""Compute per tick of the control laws; MPC beside the bare solver, and others, on the same QPs."""
 
 from collections.abc import Callable, Iterator
 from time import thread_time
@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from bench.result import Result
 from formation_gnc.common import CommonParameters, Orbit
 from formation_gnc.control.controller import Controller, Vehicle
-from formation_gnc.control.mpc import SETTINGS, ModelPredictiveController, MpcParameters
+from formation_gnc.control.mpc import ModelPredictiveController, MpcParameters
+from formation_gnc.control.osqp_session import SETTINGS
 from formation_gnc.control.registry import ALGORITHMS, FINITE_HORIZONS
 from formation_gnc.control.weights import QuadraticWeights
 from formation_gnc.orbit.elements import Elements, state_from_elements
@@ -35,7 +36,7 @@ BRYSON: dict[str, Any] = {
 }
 
 
-def laws() -> Iterator[tuple[str, Controller]]:
+def laws() -> Iterator[tuple[str, Controller[Any]]]:
     """All laws by name, and some with other parameters."""
     others = [("sdre", {"update_interval": 0.0}), ("hinf", {"form": "full_information"})]
     for name, own in [*((name, dict[str, Any]()) for name in ALGORITHMS), *others]:
@@ -46,7 +47,7 @@ def laws() -> Iterator[tuple[str, Controller]]:
         yield label, kind(kind.Parameters(**weights, **often, **own), MISSION, VEHICLE)
 
 
-def fly(law: Controller, start: NDArray[np.float64] = START) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def fly(law: Controller[Any], start: NDArray[np.float64] = START) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Compute time of each command, s of this thread, over a noisy flight, and which of them made a plan.
 
     From `START`, at the thrust limit.
@@ -67,13 +68,13 @@ def fly(law: Controller, start: NDArray[np.float64] = START) -> tuple[NDArray[np
     return times, plans
 
 
-def programmes() -> tuple[NDArray[np.float64], list[dict[str, Any]], tuple[Any, Any]]:
-    """Times of the MPC's commands, the programmes that it solved, and their matrices."""
+def qps() -> tuple[NDArray[np.float64], list[dict[str, Any]], tuple[Any, Any]]:
+    """Times of the MPC's commands, the QPs that it solved, and their matrices."""
     law = ModelPredictiveController(MpcParameters(**BRYSON), MISSION, VEHICLE)
-    solver, asked = law._solver, []
+    solver, asked = law.session.solver, []
 
-    class Listening:
-        """The solver, noting what it is asked."""
+    class Recorder:
+        """The solver, with a record of its updates."""
 
         def update(self, **values: Any) -> None:
             asked.append(values)
@@ -82,14 +83,14 @@ def programmes() -> tuple[NDArray[np.float64], list[dict[str, Any]], tuple[Any, 
         def __getattr__(self, name: str) -> Any:
             return getattr(solver, name)
 
-    law._solver = Listening()
+    law.session.solver = Recorder()
     fly(law)
     plain = ModelPredictiveController(MpcParameters(**BRYSON), MISSION, VEHICLE)
-    return fly(plain)[0], asked, law.matrices
+    return fly(plain)[0], asked, law.session.matrices
 
 
 def solve_all(asked: list[dict[str, Any]], solve: Callable[[dict[str, Any]], Any]) -> NDArray[np.float64]:
-    """Compute time of each programme, s of this thread."""
+    """Compute time of each QP, s of this thread."""
     times = np.empty(len(asked))
     for index, values in enumerate(asked):
         started = thread_time()
@@ -120,7 +121,7 @@ def others(matrices: tuple[Any, Any]) -> dict[str, Callable[[dict[str, Any]], An
 
 def run() -> list[Result]:
     """All figures of the control laws, in microseconds of compute."""
-    ticks, asked, matrices = programmes()
+    ticks, asked, matrices = qps()
     bare = osqp.OSQP()
     rows = matrices[1].shape[0]
     bare.setup(matrices[0], asked[0]["q"], matrices[1], np.full(rows, -1.0), np.full(rows, 1.0), **SETTINGS)

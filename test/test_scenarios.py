@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 
 from formation_gnc.cli import main
-from formation_gnc.control.registry import ALGORITHMS
 from formation_gnc.control.weights import QuadraticWeights
 from formation_gnc.recording.reader import Bag
 from formation_gnc.sil.scenario import find_scenario, load_scenario
@@ -37,7 +36,7 @@ def test_every_scenario_is_replayed_to_the_recorded_bits(
 def test_laws_with_quadratic_weights_have_those_of_lqr(name: str) -> None:
     """They are compared with one another: `verification/laws.py`."""
     for setup in load_scenario(name).deputies.values():
-        laws = {law: getattr(setup["controller"], law, None) for law in ALGORITHMS}
+        laws = setup["controller"].laws
         weights = {law: own.weights() for law, own in laws.items() if isinstance(own, QuadraticWeights)}
         assert len(weights) > 6
         assert {law: each for law, each in weights.items() if each != weights["lqr"]} == {}

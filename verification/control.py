@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -44,7 +45,7 @@ def estimate(time: float, state: Array, chief: Array, mass: float) -> Navigation
 
 
 def fly(
-    law: Controller,
+    law: Controller[Any],
     chief: Array,
     start: Array,
     goal: Callable[[float], Array],
@@ -143,7 +144,7 @@ def neokleous(directory: Path) -> tuple[str, list[Figure]]:
         "|---|---|---|---|---|",
     ]
     start = np.array([100.0, 100.0, 100.0, 0.0, 0.0, 0.0])
-    laws: dict[str, Callable[[], Controller]] = {
+    laws: dict[str, Callable[[], Controller[Any]]] = {
         "LQR, R = 200 I": lambda: neokleous_lqr(200.0, math.inf),
         "H-infinity, shift 0.1 / min": lambda: neokleous_hinf(math.inf),
     }
@@ -173,7 +174,7 @@ def neokleous(directory: Path) -> tuple[str, list[Figure]]:
     least = least_delta_v(HillModel(GEO_RATE), start, origin, 10.0 * GEO.tick, np.full(100, True), math.inf)
     least *= MINUTE**2 / GEO.tick
     share = least / totals["LQR, R = 200 I"]
-    best_gamma = neokleous_hinf(math.inf).best_gamma
+    best_gamma = neokleous_hinf(math.inf).optimal_gamma
     lines += [
         "",
         "Printed totals: 1.8748 N (LQR) and 0.0143 N (H-infinity). The least that any law can spend in",
@@ -185,7 +186,7 @@ def neokleous(directory: Path) -> tuple[str, list[Figure]]:
     ]
     figures += [
         Figure("least spending over LQR's", "above 0.0076", share, "", 0.05, 0.12),
-        Figure("best gamma, printed weights", "below 1 asked", neokleous_hinf(math.inf).best_gamma, "", 2.1, 2.3),
+        Figure("best gamma, printed weights", "below 1 asked", neokleous_hinf(math.inf).optimal_gamma, "", 2.1, 2.3),
     ]
     lines += [
         "1 km off in every axis, thrust limited to 1 N on 1000 kg; 20 hours.",

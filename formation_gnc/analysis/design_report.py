@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from formation_gnc.analysis.plot import HILL_AXES
 from formation_gnc.control.controller import Controller, Vehicle
+from formation_gnc.control.controller_manager import ControllerParameters
 from formation_gnc.control.linear import LinearController
 from formation_gnc.control.models import DESIGN_MODELS
 from formation_gnc.control.registry import ALGORITHMS
@@ -46,14 +47,14 @@ class Design:
     """(N, 4) time, s, and position error, m, from an initial offset of 1 m in every axis."""
 
 
-def design(parameters: Any) -> Design:
+def design(parameters: ControllerParameters) -> Design:
     """Design the law that parameters of a controller select, and report it.
 
     Raises:
-        ConfigurationError: it cannot be designed.
+        DesignError: the parameters admit no law.
     """
     name, tick = parameters.algorithm, parameters.tick
-    own = getattr(parameters, name)
+    own = parameters.laws[name]
     law = ALGORITHMS[name](own, parameters, Vehicle(parameters.mass, np.array(parameters.thrust_limit)))
     figures = law.figures()
     controller = law.linear(0)
@@ -61,8 +62,10 @@ def design(parameters: Any) -> Design:
         return Design(name, figures)
     model = DESIGN_MODELS[own.model](parameters)
     loops, repeats = _loops(law, model, tick)
-    turn = reduce(lambda before, loop: np.linalg.matrix_power(loop, repeats) @ before, loops, np.eye(len(loops[0])))
-    poles = np.log(np.linalg.eigvals(turn).astype(complex)) / (tick * repeats * len(loops))
+    monodromy = reduce(
+        lambda before, loop: np.linalg.matrix_power(loop, repeats) @ before, loops, np.eye(len(loops[0]))
+    )
+    poles = np.log(np.linalg.eigvals(monodromy).astype(complex)) / (tick * repeats * len(loops))
     poles = poles[np.argsort(-poles.real)]
     frequency = np.geomspace(1e-2 * parameters.mean_motion, np.pi / tick, FREQUENCIES)
     values = _input_loop(controller, *model.discretise(0.0, tick), frequency * tick)
@@ -76,7 +79,7 @@ def _is_bound(name: str) -> bool:
     return name.startswith("gamma /")
 
 
-def _loops(law: Controller, model: RelativeModel, tick: float) -> tuple[list[Matrix], int]:
+def _loops(law: Controller[Any], model: RelativeModel, tick: float) -> tuple[list[Matrix], int]:
     """Closed-loop transition matrices over a tick, at one place of the orbit or at `PLACES`, and the number
     of ticks for which each holds."""
     places = 1 if model.is_time_invariant else PLACES

@@ -1,6 +1,6 @@
 """Design the control law of a scenario and report it, without a flight.
 
-Gains, closed-loop poles, margins, gamma, horizon and size of the optimisation problem, as the law has them.
+Gains, closed-loop poles, margins, gamma, horizon and size of the QP, as applicable to the law.
 """
 
 import argparse
@@ -68,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
     table.add_column("figure")
     table.add_column("value", no_wrap=True)
     poles = "\n".join(f"{pole.real:.4g} {pole.imag:+.4g}i" for pole in designed.poles)
-    rows = designed.figures | ({"poles of the closed loop [1/s]": poles} if poles else {})
+    rows = designed.figures | ({"closed-loop poles [1/s]": poles} if poles else {})
     for name, value in rows.items():
         table.add_row(escape(name), escape(_text(value)))
     console.print(table)

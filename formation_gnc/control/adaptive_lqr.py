@@ -1,4 +1,4 @@
-"""LQR with two networks that learn in flight what its model leaves out."""
+"""Adaptive LQR: two neural networks identify and compensate unmodelled dynamics in flight."""
 
 import math
 from dataclasses import dataclass
@@ -8,9 +8,9 @@ import numpy as np
 
 from formation_gnc.common import CommonParameters
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
-from formation_gnc.control.finite_horizon import leaps
-from formation_gnc.control.networks import Networks, Regulator, functions
+from formation_gnc.control.networks import Networks, Regulator, basis_functions
 from formation_gnc.control.riccati import Weights, continuous_cost_to_go
+from formation_gnc.control.target_prediction import has_jumped
 from formation_gnc.control.weights import QuadraticWeights
 from formation_gnc.errors import DesignError
 from formation_gnc.parameters import parameter
@@ -18,53 +18,54 @@ from formation_gnc.records import NavigationState, Target
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.types import NANOSECONDS, Vector
 
-LARGEST_WEIGHT = 1e6
-"""Of a network; beyond it the network counts as blown up: its units make weights of order one."""
+MAX_WEIGHT = 1e6
+"""Network weight that counts as divergence: in the networks' units weights are of order one."""
 
-FEWEST_TICKS = 5
-"""Of the identification time: what follows from continuous time is stepped by Euler's method."""
+MIN_TICKS = 5
+"""Least ticks per identification time: the continuous update laws are integrated by Euler's method."""
 
-FARTHEST = 1e12
-"""Error, m or m/s, that nobody flies, and that would undo what was learnt."""
+MAX_ERROR = 1e12
+"""Error (m or m/s) beyond which the networks are not evaluated: it would destroy their weights."""
 
 
 @dataclass(frozen=True)
 class AdaptiveLqrParameters(QuadraticWeights):
-    """Weights of the regulator, and pace and reach of the networks."""
+    """Weights of the regulator, and adaptation parameters of the networks."""
 
     identification_time: float = parameter(
         100.0,
         unit="s",
         above=0.0,
         in_flight=True,
-        doc="time in which an acceleration that the model lacks is learnt; longer averages more noise",
+        doc="time constant of the identification of unmodelled acceleration; longer averages more noise",
     )
     reach: float = parameter(
         100.0,
         unit="m",
         above=0.0,
         in_flight=True,
-        doc="error up to which the networks act; LQR flies alone far beyond it",
+        doc="error up to which the networks act; far beyond it the law is LQR alone",
     )
     inertia: float = parameter(
         0.1,
         minimum=0.0,
         in_flight=True,
-        doc="weight on keeping the weights of the costate network: R1 of Joshi (8.8)",
+        doc="weight on changes of the costate network: R1 of Joshi (8.8)",
     )
 
 
-class AdaptiveLinearQuadraticRegulator(Controller):
-    """LQR on Hill's equations, and the costate for what they leave out, learnt in flight (Joshi 8).
+class AdaptiveLinearQuadraticRegulator(Controller[AdaptiveLqrParameters]):
+    """LQR on Hill's equations with an adaptive costate for unmodelled dynamics (Joshi 8).
 
-    u = -R^-1 B' (P e + lambda), with e the error against the target. What Hill's equations leave out of the
-    motion of e, one network learns: eccentricity, a wrong semi-major axis, J2, drag, and a target that is no
-    free orbit. The other learns lambda. The law starts as LQR.
+    u = -R^-1 B' (P e + lambda), with e the error from the target. One network identifies the unmodelled
+    acceleration of e: eccentricity, a wrong semi-major axis, J2, drag, and a target that is not in free motion.
+    The other approximates lambda. With zero weights the law is LQR.
 
-    While a thruster is at its limit, lambda is not learnt. When a weight blows up, LQR flies alone from then
-    on, and the command says so; an error beyond `FARTHEST` is LQR's alone for as long as it is there.
+    lambda is not trained while a thruster saturates. If a weight diverges, LQR alone is active from then on and
+    the command gives the reason; likewise for as long as the error is beyond `MAX_ERROR`.
 
-    Assumes: what is left out changes slowly against `identification_time`, or with the chief's revolution.
+    Assumes: unmodelled accelerations that vary slowly relative to `identification_time`, or periodically with
+    the argument of latitude.
     """
 
     Parameters = AdaptiveLqrParameters
@@ -73,17 +74,18 @@ class AdaptiveLinearQuadraticRegulator(Controller):
         """Solve for the regulator.
 
         Raises:
-            DesignError: inadmissible weights, no stabilising solution, or learning too brisk for the tick.
+            DesignError: inadmissible weights, no stabilising solution, or an identification time too short for the
+                tick.
         """
-        if parameters.identification_time < FEWEST_TICKS * common.tick:
+        if parameters.identification_time < MIN_TICKS * common.tick:
             raise DesignError(
                 f"adaptive_lqr: identification_time is {parameters.identification_time} s; "
-                f"it must be at least {FEWEST_TICKS} ticks of {common.tick} s"
+                f"it must be at least {MIN_TICKS} ticks of {common.tick} s"
             )
         model, orbit = HillModel(common.mean_motion), common.chief
         self._tick = common.tick
         self._limit, self._mass = vehicle.thrust_limit, vehicle.mass
-        self._rate, self._latitude = model.mean_motion, orbit.argument_of_perigee + orbit.true_anomaly
+        self._mean_motion, self._latitude = model.mean_motion, orbit.argument_of_perigee + orbit.true_anomaly
         self._radius = orbit.semi_major_axis / parameters.reach
         try:
             weights = Weights.scaled(
@@ -92,65 +94,67 @@ class AdaptiveLinearQuadraticRegulator(Controller):
             cost_to_go, _ = continuous_cost_to_go(model.dynamics(0.0), model.INPUT, weights)
         except DesignError as error:
             raise DesignError(f"adaptive_lqr: {error}") from error
-        self._pace = math.sqrt(weights.input_unit[0])
+        self._rate_unit = math.sqrt(weights.input_unit[0])
         self._state_unit = parameters.reach * weights.state_unit
         self._input_unit = parameters.reach * weights.input_unit
-        self.cost_to_go = weights.cost_unit / self._pace * cost_to_go / np.outer(weights.state_unit, weights.state_unit)
-        dynamics = weights.step(model.dynamics(0.0), model.INPUT)[0] / self._pace
+        self.cost_to_go = (
+            weights.cost_unit / self._rate_unit * cost_to_go / np.outer(weights.state_unit, weights.state_unit)
+        )
+        dynamics = weights.step(model.dynamics(0.0), model.INPUT)[0] / self._rate_unit
         self._regulator = Regulator(dynamics, weights.state, weights.input, cost_to_go)
-        self.networks = Networks(self._regulator, parameters.identification_time * self._pace, parameters.inertia)
+        self.networks = Networks(self._regulator, parameters.identification_time * self._rate_unit, parameters.inertia)
         self._target: Target | None = None
         self._failure = ""
 
     def figures(self) -> dict[str, Any]:
-        """The gain on force that the law starts with, and how much it has to learn."""
+        """The gain on force at zero weights, and the number of weights."""
         columns = [self._regulator.thrust(error, np.zeros(6)) for error in np.diag(1.0 / self._state_unit)]
         gain = -self._mass * self._input_unit[:, None] * np.transpose(columns)
         networks = (self.networks.model_weights, self.networks.costate_weights)
         return {
-            "gain at the start [N/m, N/(m/s)]": gain.tolist(),
+            "initial gain [N/m, N/(m/s)]": gain.tolist(),
             "network weights": sum(each.size for each in networks),
         }
 
     def activate(self, handover: Handover) -> None:
-        """Go on with what a law of the same kind and reach has learnt."""
+        """Take over the weights of a previous law with the same units."""
         before = handover.law
         if (
             isinstance(before, AdaptiveLinearQuadraticRegulator)
             and not before._failure
             and (before._state_unit == self._state_unit).all()
         ):
-            self.networks.remember(before.networks)
+            self.networks.copy_weights(before.networks)
 
     def command(self, estimate: NavigationState, target: Target) -> Command:
-        """The force of the regulator and the networks, which learn from this tick."""
+        """The force of the regulator with the networks, which are updated at every tick."""
         offset = estimate.relative_state - target.relative_state
         error, reason = offset / self._state_unit, self._failure
-        if not np.abs(offset).max() < FARTHEST:
-            reason = reason or "adaptive_lqr: the error is out of any range; LQR flies"
+        if not np.abs(offset).max() < MAX_ERROR:
+            reason = reason or "adaptive_lqr: error out of range; LQR active"
         elif not reason:
-            thrust = self._learn(estimate, target, error)
+            thrust = self._adapt(estimate, target, error)
             largest = self.networks.largest_weight
-            if not (largest <= LARGEST_WEIGHT and np.isfinite(thrust).all()):
-                reason = f"adaptive_lqr: network weights have blown up to {largest:.3g}; LQR flies"
+            if not (largest <= MAX_WEIGHT and np.isfinite(thrust).all()):
+                reason = f"adaptive_lqr: network weights have diverged to {largest:.3g}; LQR active"
                 self._failure = reason
         if reason:
             thrust = self._regulator.thrust(error, np.zeros(6))
-        self._target = None if reason else target  # none: the virtual deputy has stayed behind
+        self._target = None if reason else target  # none: the observer was not updated
         return Command(estimate.mass * self._input_unit * thrust, fallback=reason)
 
-    def _learn(self, estimate: NavigationState, target: Target, error: Vector) -> Vector:
-        """Scaled thrust, with the networks corrected by what the last one did."""
-        networks, tick = self.networks, self._tick * self._pace
-        latitude = self._latitude + self._rate * estimate.time / NANOSECONDS
-        values, slopes = functions(estimate.relative_state / self._state_unit, self._radius, latitude)
-        if self._target is None or leaps(self._target, target):
-            networks.meet(error)
-        networks.identify(error, values, slopes, tick)
+    def _adapt(self, estimate: NavigationState, target: Target, error: Vector) -> Vector:
+        """Scaled thrust (3,), after an update of the networks."""
+        networks, tick = self.networks, self._tick * self._rate_unit
+        latitude = self._latitude + self._mean_motion * estimate.time / NANOSECONDS
+        basis, gradients = basis_functions(estimate.relative_state / self._state_unit, self._radius, latitude)
+        if self._target is None or has_jumped(self._target, target):
+            networks.reset_observer(error)
+        networks.identify(error, basis, gradients, tick)
         wanted = networks.thrust(error)
         limit = self._limit / (estimate.mass * self._input_unit)
-        flown = np.clip(wanted, -limit, limit)
-        following = networks.fly(error, values, flown, tick)
-        if (flown == wanted)[self._limit > 0.0].all():
-            networks.teach(error, following, slopes, tick)
+        applied = np.clip(wanted, -limit, limit)
+        following = networks.predict(error, basis, applied, tick)
+        if (applied == wanted)[self._limit > 0.0].all():
+            networks.train(error, following, gradients, tick)
         return wanted

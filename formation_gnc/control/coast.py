@@ -1,4 +1,4 @@
-"""No thrust."""
+"""Free drift."""
 
 from dataclasses import dataclass
 
@@ -11,11 +11,11 @@ from formation_gnc.records import NavigationState, Target
 
 @dataclass(frozen=True)
 class CoastParameters:
-    """Coasting has nothing to set."""
+    """No parameters."""
 
 
-class Coast(Controller):
-    """Free flight: commands no thrust, whatever the error."""
+class Coast(Controller[CoastParameters]):
+    """Free drift: zero thrust at any error."""
 
     Parameters = CoastParameters
 
@@ -23,5 +23,5 @@ class Coast(Controller):
         """Nothing to design."""
 
     def command(self, estimate: NavigationState, target: Target) -> Command:
-        """No force."""
+        """Zero force."""
         return Command(np.zeros(3))

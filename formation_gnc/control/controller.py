@@ -1,4 +1,4 @@
-"""What every control law can do."""
+"""The interface of a control law."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -12,79 +12,78 @@ from formation_gnc.types import Matrix, Vector
 
 @dataclass(slots=True)
 class Command:
-    """What a law asks for at a tick, before the thrust limit.
-
-    A law with a solver reports on it; `fallback` says why its own answer could not be used.
-    """
+    """A law's output at a tick, before the thrust limit."""
 
     force: Vector
     """(3,) force to hold over the tick, Hill frame, N."""
     solver: str = ""
+    """Status of the law's solver, if it has one."""
     iterations: int = 0
     cost: float = 0.0
     fallback: str = ""
+    """Why the law's own answer could not be used, and what replaces it; empty when it is used."""
 
 
 @dataclass(frozen=True)
 class Handover:
-    """What flew before, for a law that takes over at a tick without a jump in thrust."""
+    """State at the tick at which a law becomes active, for a bumpless transfer."""
 
     force: Vector
-    """(3,) force commanded over the tick before, Hill frame, N."""
+    """(3,) force commanded over the previous tick, Hill frame, N."""
     algorithm: str
-    """Name of the law that commanded it; the own name when only parameters changed."""
-    law: "Controller | None" = None
-    """That law itself, whose memory one of the same kind may go on with."""
+    """Registry name of the law that commanded it; the law's own name when only parameters changed."""
+    law: "Controller[Any] | None" = None
+    """That law, whose internal state a law of the same class may take over."""
 
 
 @dataclass(frozen=True)
 class Vehicle:
-    """What a law knows of the deputy it flies."""
+    """Properties of the controlled deputy that a design depends on."""
 
     mass: float
-    """Mass at the start, kg."""
+    """Initial mass, kg."""
     thrust_limit: Vector
     """(3,) largest force per axis, N."""
 
 
-class Controller(ABC):
-    """A control law: designed off the cycle, asked at every tick.
+class Controller[P](ABC):
+    """A control law with parameters of type `P`: designed off the cycle, evaluated at every tick.
 
-    A subclass's docstring says what the law does, what it assumes and where it comes from; its `Parameters`
-    are a frozen dataclass of :func:`formation_gnc.parameters.parameter` fields, and become the controller
-    node's parameters under the law's name in the registry.
+    A subclass's docstring states the law, its assumptions and its source. `Parameters` is the class `P`, a
+    frozen dataclass of :func:`formation_gnc.parameters.parameter` fields; they become parameters of the
+    controller node under the law's name in the registry.
     """
 
     Parameters: ClassVar[type]
 
     @abstractmethod
-    def __init__(self, parameters: Any, common: CommonParameters, vehicle: Vehicle) -> None:
+    def __init__(self, parameters: P, common: CommonParameters, vehicle: Vehicle) -> None:
         """Design the law; may be slow.
 
         Raises:
-            DesignError: no law follows from these parameters; the message says why.
+            DesignError: the parameters admit no law; the message gives the reason.
         """
 
-    def activate(self, handover: Handover) -> None:  # noqa: B027 - a law without memory has nothing to take over
-        """Start from what flew before; called once, before the first `command`."""
+    def activate(self, handover: Handover) -> None:  # noqa: B027 - optional for stateless laws
+        """Initialise from the law that was active before; called once, before the first `command`."""
 
     @abstractmethod
     def command(self, estimate: NavigationState, target: Target) -> Command:
         """The force for the tick that begins at the estimate's stamp."""
 
     def figures(self) -> dict[str, Any]:
-        """What there is to say of the design: names with units, and numbers, lists of them or words."""
+        """Design figures by name with unit: numbers, lists of numbers, or words."""
         return {}
 
     def linear(self, time: int) -> LinearController | None:
-        """The law per tick, without limits, as it is at a time of the run (ns); none when it is not linear.
+        """Sampled linear form of the law, without limits, at a time of the run (ns); None if nonlinear.
 
-        A law that has one has the `model` that it is designed on among its parameters.
+        A law with a linear form has the parameter `model`, the relative-motion model of its design.
         """
         return None
 
     def singular_values(self, frequency: Vector) -> dict[str, Matrix]:
-        """Those that the design bounds, by name with unit: (N, 3) over frequencies (N,), rad/s.
+        """Singular values that the design bounds, by name with unit: (N, 3) over frequencies (N,), rad/s.
 
         Names that begin with "gamma /" are the bounds.
         """

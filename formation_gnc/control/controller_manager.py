@@ -1,7 +1,7 @@
-"""The control law in use, its limits, and the swap from one law to another."""
+"""The active control law, its limits, and the swap from one law to another."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, make_dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from math import inf, isfinite
 from typing import Any
 
@@ -11,16 +11,16 @@ from formation_gnc.control.controller import Command, Controller, Handover, Vehi
 from formation_gnc.control.registry import ALGORITHMS
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight.module import Configuration, FlightModule, ModuleParameters
-from formation_gnc.parameters import parameter
+from formation_gnc.parameters import parameter, per_entry
 from formation_gnc.records import EventKind, NavigationState, Status, Target, Thrust
 
 
 @dataclass(frozen=True)
-class BaseControllerParameters(ModuleParameters):
-    """What holds for every law."""
+class ControllerParameters(ModuleParameters):
+    """Parameters of the controller node: those common to all laws, and each law's own under its name."""
 
-    algorithm: str = parameter("lqr", choices=tuple(ALGORITHMS), in_flight=True, doc="control law in use")
-    mass: float = parameter(100.0, unit="kg", above=0.0, doc="deputy's mass at the start, for the design")
+    algorithm: str = parameter("lqr", choices=ALGORITHMS, in_flight=True, doc="active control law")
+    mass: float = parameter(100.0, unit="kg", above=0.0, doc="initial mass of the deputy, for the design")
     thrust_limit: tuple[float, ...] = parameter(
         (0.01, 0.01, 0.01), unit="N", length=3, minimum=0.0, doc="largest force per Hill axis"
     )
@@ -29,12 +29,13 @@ class BaseControllerParameters(ModuleParameters):
         above=0.0,
         maximum=2.0,
         in_flight=True,
-        doc="largest step in force when a law takes over, as a share of thrust_limit; the rest follows in "
-        "such steps, one a tick",
+        doc="largest step in force when the law changes, as a share of thrust_limit; the rest of the change "
+        "follows at one such step per tick",
     )
+    laws: Mapping[str, Any] = per_entry(ALGORITHMS)
 
     def __post_init__(self) -> None:
-        """Raise ConfigurationError for thrusters that cannot push."""
+        """Raise ConfigurationError for a thrust limit of zero on every axis."""
         super().__post_init__()
         if not any(self.thrust_limit):
             raise ConfigurationError(
@@ -42,55 +43,49 @@ class BaseControllerParameters(ModuleParameters):
             )
 
 
-ControllerParameters: Any = make_dataclass(
-    "ControllerParameters",
-    [(name, law.Parameters) for name, law in ALGORITHMS.items()],
-    bases=(BaseControllerParameters,),
-    frozen=True,
-    kw_only=True,
-    namespace={"__doc__": "Parameters of the controller node: what holds for every law, and each law's own."},
-)
+class ControllerManager(FlightModule[ControllerParameters, Controller[Any]]):
+    """Evaluates the active law at every tick and enforces the limits.
 
-
-class ControllerManager(FlightModule[Any, Controller]):
-    """Asks the law in use at every tick and holds its answer inside the limits.
-
-    A command is finite and within the limit whatever comes in and whatever the law returns; what had to be
-    changed is in the status. When a law takes over, what its first answer differs from the force flown
-    before, beyond one step, is taken off and given back step by step.
+    The thrust is finite and within its limit for any input and any output of the law; the status reports
+    every intervention. When the law changes, the step in force beyond `handover_step` is withheld, then
+    released at that rate.
     """
 
     def reset(self) -> None:
-        """Nothing has been flown yet."""
+        """Clear the commanded force and the state of a handover."""
         self._force = np.zeros(3)
         self._predecessor: str | None = None
         self._withheld = [0.0, 0.0, 0.0]
         self._fallback = ""
 
-    def design(self, parameters: Any) -> Controller:
-        """Design the named law from its own parameters."""
+    def design(self, parameters: ControllerParameters) -> Controller[Any]:
+        """Design the law named by `algorithm`; raises DesignError as that law."""
         law = ALGORITHMS[parameters.algorithm]
         vehicle = Vehicle(parameters.mass, np.array(parameters.thrust_limit))
-        return law(getattr(parameters, parameters.algorithm), parameters, vehicle)
+        return law(parameters.laws[parameters.algorithm], parameters, vehicle)
 
-    def activate(self, old: Configuration[Any, Controller], new: Configuration[Any, Controller]) -> None:
-        """Tell the new law what flew before."""
+    def activate(
+        self,
+        old: Configuration[ControllerParameters, Controller[Any]],
+        new: Configuration[ControllerParameters, Controller[Any]],
+    ) -> None:
+        """Hand the commanded force and the old law to the new law."""
         self._predecessor = old.parameters.algorithm
         new.design.activate(Handover(self._force, self._predecessor, old.design))
 
     def on_tick(self, estimate: NavigationState, target: Target) -> tuple[Thrust, Status]:
-        """The command for the tick that begins at the estimate's stamp, and how it came about."""
+        """Thrust for the tick that begins at the estimate's stamp, and the controller's status."""
         self.begin_tick(estimate.time)
-        command = self._ask(estimate, target)
+        command = self._evaluate(estimate, target)
         wanted, limit = command.force.tolist(), self.parameters.thrust_limit
-        force = self._blend(estimate.time, within(wanted, limit))
-        self._note_fallback(estimate.time, command.fallback)
+        force = self._limit_step(estimate.time, within(wanted, limit))
+        self._record_fallback(estimate.time, command.fallback)
         self._force = np.array(force)
         return Thrust(estimate.time, self._force), Status(
             estimate.time,
             self.parameters.algorithm,
             command.force,
-            [abs(value) > most for value, most in zip(wanted, limit, strict=True)],
+            [abs(value) > largest for value, largest in zip(wanted, limit, strict=True)],
             command.solver,
             command.iterations,
             command.cost,
@@ -98,8 +93,8 @@ class ControllerManager(FlightModule[Any, Controller]):
         )
 
     @np.errstate(all="ignore")
-    def _ask(self, estimate: NavigationState, target: Target) -> Command:
-        """The law's answer, or no thrust with the reason when there is none to use."""
+    def _evaluate(self, estimate: NavigationState, target: Target) -> Command:
+        """The law's command; zero thrust with the reason when input or output is unusable."""
         state = estimate.relative_state.tolist()
         if not all(map(isfinite, state + target.relative_state.tolist())):
             name = "target" if all(map(isfinite, state)) else "estimate"
@@ -115,12 +110,12 @@ class ControllerManager(FlightModule[Any, Controller]):
             return Command(np.zeros(3), fallback="command not finite: no thrust")
         return command
 
-    def _blend(self, time: int, wanted: list[float]) -> list[float]:
-        """Bound the step at a hand-over, and give back what was withheld."""
+    def _limit_step(self, time: int, wanted: list[float]) -> list[float]:
+        """Bound the step in force at a handover, and release what earlier handovers withheld."""
         if self._predecessor is None and not any(self._withheld):
             return wanted
         limit = self.parameters.thrust_limit
-        step = [self.parameters.handover_step * most for most in limit]
+        step = [self.parameters.handover_step * largest for largest in limit]
         if self._predecessor is not None:
             asked = _minus(wanted, self._force.tolist())
             self._withheld = _minus(asked, within(asked, step))
@@ -132,15 +127,15 @@ class ControllerManager(FlightModule[Any, Controller]):
             self._withheld = _minus(self._withheld, within(self._withheld, step))
         return within(_minus(wanted, self._withheld), limit)
 
-    def _note_fallback(self, time: int, reason: str) -> None:
-        """Record when a fallback begins, changes or ends."""
+    def _record_fallback(self, time: int, reason: str) -> None:
+        """Record an event when a fallback begins, changes or ends."""
         if reason != self._fallback:
             self.log(time, EventKind.FALLBACK, reason or "over", self.parameters.algorithm)
             self._fallback = reason
 
 
 def within(values: Sequence[float], limits: Sequence[float]) -> list[float]:
-    """Each value, or the limit of its axis where it is beyond it."""
+    """Each value clipped to plus or minus the limit of its axis."""
     return [min(max(value, -limit), limit) for value, limit in zip(values, limits, strict=True)]
 
 

@@ -1,13 +1,13 @@
-"""From one state to another in a given time: the linear problem, and the sequence of them that ASRE is.
+"""Linear quadratic control with a fixed end point, and the sequence of such problems of ASRE.
 
-The two-point problem of a linear system and a quadratic cost has a Hamiltonian transition matrix, which takes
-state and co-state from the start to the end (Joshi 5.13). Solved for the state at the end and the co-state at
-the start, it is the Riccati map of `formation_gnc.control.riccati`,
+The two-point boundary value problem of a linear system with quadratic cost has a Hamiltonian transition matrix
+from state and costate at the start to those at the end (Joshi 5.13). Rearranged for the state at the end and
+the costate at the start, it is the Riccati map of `formation_gnc.control.riccati`,
 
-    x_N = A x_0 - G l_N,   l_0 = H x_0 + A' l_N:
+    x_N = A x_0 - G l_N,   l_0 = H x_0 + A' l_N,
 
-the same four blocks, of which none grows with the horizon. G is what has to be inverted for a given end, in
-the place of the block phi_12 of (5.16).
+whose blocks stay bounded as the horizon grows. The fixed end point requires the inverse of G, instead of the
+block phi_12 of (5.16).
 """
 
 from collections.abc import Callable
@@ -27,19 +27,19 @@ from formation_gnc.types import Matrix, Vector
 FACTORISATIONS = {"sdc1": sdc1, "sdc2": sdc2}
 """Joshi's methods I and II, by name."""
 
-SINGULAR = 1e-10
-"""Smallest eigenvalue of the reach, each state in units of its own reach, that can be inverted."""
+MIN_EIGENVALUE = 1e-10
+"""Smallest eigenvalue of the Gramian, normalised to a unit diagonal, at which it counts as regular."""
 
 System = Callable[[Array], tuple[Array, Array]]
-"""Matrices A (2 N + 1, n, n) and B (2 N + 1, n, m) of dx/dt = A x + B u at states (2 N + 1, n), which are
-those at the beginnings, middles and ends of N steps."""
+"""A (2 N + 1, n, n) and B (2 N + 1, n, m) of dx/dt = A x + B u at states (2 N + 1, n): those at the beginnings,
+middles and ends of N steps."""
 
 
 def state_dependent(model: RelativeModel, factorisation: str, times: Vector) -> System:
-    """The equations of relative motion as a system, for states at times (M,), s: with J2 if the model has it.
+    """The factorised equations of motion of a model, for states at times (M,), s.
 
     Raises:
-        ValueError: a model that is not one of these equations.
+        ValueError: the model is neither nonlinear nor oblate.
     """
     if not isinstance(model, NonlinearModel | OblateModel):
         raise ValueError(f"{type(model).__name__} has no factorisation")
@@ -56,13 +56,13 @@ def state_dependent(model: RelativeModel, factorisation: str, times: Vector) -> 
     return system
 
 
-def discretised(a: Array, b: Array, step: float) -> tuple[Array, Array]:
-    """Phi (N, n, n) and Gamma (N, n, m) over N steps of held input, to order four.
+def discretise(a: Array, b: Array, step: float) -> tuple[Array, Array]:
+    """Phi (N, n, n) and Gamma (N, n, m) over N steps of held input, by RK4.
 
     Args:
         a: (2 N + 1, n, n) at the beginnings, middles and ends of the steps.
         b: (2 N + 1, n, m) likewise.
-        step: length of each, s.
+        step: length of a step, s.
     """
     size = a.shape[-1]
     joint = np.concatenate([a, b], axis=-1)
@@ -84,32 +84,32 @@ def discretised(a: Array, b: Array, step: float) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True)
-class Steering:
-    """What takes a system from one state to another."""
+class Trajectory:
+    """An optimal trajectory between two states."""
 
     inputs: Array
     """(N, m) held over the steps."""
     states: Array
-    """(N + 1, n)."""
+    """(N + 1, n) at the ends of the steps."""
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Sum over the steps of x' Q x + u' R u, plus e' S^-1 e of the error at the end."""
+    """Sum over the steps of x' Q x + u' R u, plus e' S^-1 e of the terminal error."""
 
     state: Matrix
     """(n, n) Q."""
     input: Matrix
     """(m, m) R."""
     slack: Matrix
-    """(n, n) S; zero for no error at the end."""
+    """(n, n) S; zero for a hard terminal constraint."""
 
 
-def steer(phi: Array, gamma: Array, start: Vector, goal: Vector, cost: Cost) -> Steering:
-    """The least costly way over the steps phi (N, n, n), gamma (N, n, m).
+def solve_fixed_endpoint(phi: Array, gamma: Array, start: Vector, goal: Vector, cost: Cost) -> Trajectory:
+    """The optimal trajectory over the steps phi (N, n, n), gamma (N, n, m).
 
     Raises:
-        LinAlgError: the block to be inverted is singular: the input cannot reach every state in these steps.
+        LinAlgError: the Gramian is singular: not every state is reachable in these steps.
     """
     size = len(start)
     count = len(phi)
@@ -117,33 +117,33 @@ def steer(phi: Array, gamma: Array, start: Vector, goal: Vector, cost: Cost) -> 
     own = [RiccatiMap.of_step(phi[k], gamma[k], cost.state, cost.input) for k in range(count)]
     for step in reversed(own):
         maps.append(step.then(maps[-1]))
-    maps.reverse()  # from the beginning of each step to the end of all
-    reach = maps[0].reach + cost.slack
-    unit = np.sqrt(np.diag(reach))
+    maps.reverse()  # each from the beginning of a step to the end of the horizon
+    gramian = maps[0].gramian + cost.slack
+    unit = np.sqrt(np.diag(gramian))
     if not (np.isfinite(unit).all() and unit.all()):
-        raise LinAlgError("the transition block is singular: a state is out of the input's reach")
-    normal = reach / np.outer(unit, unit)
-    if (least := float(np.linalg.eigvalsh(normal)[0])) < SINGULAR:
+        raise LinAlgError("the transition block is singular: a state is not reachable")
+    normal = gramian / np.outer(unit, unit)
+    if (least := float(np.linalg.eigvalsh(normal)[0])) < MIN_EIGENVALUE:
         raise LinAlgError(f"the transition block is singular: its smallest eigenvalue is {least:.1e}")
     costate = np.linalg.solve(normal, (maps[0].transition @ start - goal) / unit) / unit
     states, inputs = np.empty((count + 1, size)), np.empty((count, gamma.shape[-1]))
     states[0] = start
     for k in range(count):
         later = maps[k + 1].transition.T @ costate
-        free = phi[k] @ states[k] - own[k].reach @ later
-        states[k + 1] = np.linalg.solve(np.eye(size) + own[k].reach @ maps[k + 1].cost, free)
+        free = phi[k] @ states[k] - own[k].gramian @ later
+        states[k + 1] = np.linalg.solve(np.eye(size) + own[k].gramian @ maps[k + 1].cost, free)
         inputs[k] = -np.linalg.solve(cost.input, gamma[k].T @ (maps[k + 1].cost @ states[k + 1] + later))
-    return Steering(inputs, states)
+    return Trajectory(inputs, states)
 
 
 @dataclass(frozen=True)
-class Sequence:
-    """How a sequence of linear problems went."""
+class AsreResult:
+    """Result of an approximating sequence."""
 
-    steering: Steering
-    """The last of them."""
+    trajectory: Trajectory
+    """Solution of the last problem."""
     changes: tuple[float, ...]
-    """How far the states moved from each to the next, in the unit given; the first from the guess."""
+    """Largest change of a state from each problem to the next, in the given units; the first from the guess."""
     converged: bool
 
 
@@ -155,34 +155,34 @@ def approximating_sequence(
     cost: Cost,
     unit: Vector,
     tolerance: float,
-    most_iterations: int,
-) -> Sequence:
-    """ASRE: linear problems, each with the system's matrices along the way of the one before (Owis 2.4-2.6).
+    max_iterations: int,
+) -> AsreResult:
+    """ASRE: linear problems, each with the matrices along the trajectory of the previous one (Owis 2.4-2.6).
 
     Args:
-        system: the factorised equations of motion.
-        guess: (N + 1, n) states along which the first matrices are taken; the first of them is the start.
-        goal: (n,) state to have at the end.
-        duration: time for it, s.
+        system: factorised equations of motion.
+        guess: (N + 1, n) states along which the first matrices are evaluated, from the start.
+        goal: (n,) state at the end.
+        duration: of the trajectory, s.
         cost: of a step.
-        unit: (n,) size of each state, by which a change is judged.
-        tolerance: largest change, in units, at which the sequence has converged.
-        most_iterations: problems after which it has not.
+        unit: (n,) unit of each state in the convergence test.
+        tolerance: largest change of a state, in units, that counts as convergence.
+        max_iterations: bound on the number of problems.
 
     Raises:
-        LinAlgError: as :func:`steer`, or states that are not finite.
+        LinAlgError: as :func:`solve_fixed_endpoint`, or the sequence diverges.
     """
     step = duration / (len(guess) - 1)
     states, changes = guess, list[float]()
     middles = 0.5 * (guess[:-1] + guess[1:])
-    for _ in range(most_iterations):
+    for _ in range(max_iterations):
         half = np.empty((2 * len(states) - 1, len(goal)))
         half[::2], half[1::2] = states, middles
         a, b = system(half)
-        found = steer(*discretised(a, b, step), guess[0], goal, cost)
+        found = solve_fixed_endpoint(*discretise(a, b, step), guess[0], goal, cost)
         if not np.isfinite(found.states).all():
-            raise LinAlgError("the sequence has left all bounds")
-        # cubic through both ends, with the rates that the linear problem has there
+            raise LinAlgError("the sequence has diverged")
+        # Middles of the steps by the cubic Hermite interpolant.
         pushed = (
             (b[::2][:-1] @ found.inputs[..., None])[..., 0],
             (b[::2][1:] @ found.inputs[..., None])[..., 0],
@@ -194,4 +194,4 @@ def approximating_sequence(
         states = found.states
         if changes[-1] <= tolerance:
             break
-    return Sequence(found, tuple(changes), changes[-1] <= tolerance)
+    return AsreResult(found, tuple(changes), changes[-1] <= tolerance)

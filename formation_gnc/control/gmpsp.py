@@ -1,22 +1,20 @@
-"""Generalised model predictive static programming as a control law."""
+"""Generalised model predictive static programming (G-MPSP) as a control law."""
 
-from formation_gnc.control.finite_horizon import Task
 from formation_gnc.control.mpsp import StaticProgrammingController, StaticProgrammingParameters
+from formation_gnc.control.plan import Task
 from formation_gnc.control.static_programming import StaticPlan, gmpsp
-from formation_gnc.types import Vector
 
 
-class GmpspController(StaticProgrammingController):
-    """G-MPSP: least effort with a hard final state, in continuous time (Joshi 7).
+class GmpspController(StaticProgrammingController[StaticProgrammingParameters]):
+    """G-MPSP: minimum effort with terminal constraint, in continuous time (Joshi 7).
 
-    As MPSP, with a thrust that varies over a step: `step` may be longer. It is flown as its mean over every
-    tick.
+    As MPSP, with thrust that varies within a step, so that `step` may be longer. Each tick applies its mean.
 
-    Assumes: thrust within its limit; a plan that asks more does not fly.
+    Assumes: thrust within its limit; a plan beyond it is rejected.
     """
 
     Parameters = StaticProgrammingParameters
 
-    def program(self, task: Task, tolerance: Vector, most_iterations: int) -> StaticPlan:
-        """Run G-MPSP."""
-        return gmpsp(task, tolerance, most_iterations)
+    def solve(self, task: Task) -> StaticPlan:
+        """G-MPSP iterations."""
+        return gmpsp(task, self.tolerance, self.parameters.max_iterations)

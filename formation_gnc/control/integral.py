@@ -1,4 +1,4 @@
-"""Integral action, for the laws that have it on request."""
+"""Optional integral action on the position error."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,19 +13,19 @@ from formation_gnc.types import Matrix
 
 @dataclass(frozen=True)
 class IntegralWeights(QuadraticWeights):
-    """And the weight of the integral of the position error, three more states of a law that has it."""
+    """Quadratic weights, with one on the integral of the position error as three further states."""
 
     integral_error: float = parameter(
         0.0,
         unit="m s",
         minimum=0.0,
         in_flight=True,
-        doc="integral of position error that weighs one; 0 for no integral",
+        doc="integral of position error with unit cost; 0 for no integral action",
     )
 
     @property
     def integrates(self) -> bool:
-        """Whether there is an integral."""
+        """Whether the law has integral action."""
         return self.integral_error > 0.0
 
     def joint_matrix(self) -> Matrix:
@@ -37,9 +37,9 @@ class IntegralWeights(QuadraticWeights):
 def with_integral(
     dynamics: Matrix, inputs: Matrix, kept: Matrix | float = 0.0, rate: float = 1.0
 ) -> tuple[Matrix, Matrix]:
-    """Dynamics (9, 9) and inputs (9, 3) of a model, (6, 6) and (6, 3), with the integral of position.
+    """Model (6, 6), (6, 3) augmented by the integral of position: (9, 9) and (9, 3).
 
-    Continuous as it stands; of steps, `kept` is what stays of the integral and `rate` the step, s.
+    The defaults augment a continuous model; a discrete one has `kept` the identity and `rate` the step, s.
     """
     joint = np.zeros((9, 9))
     joint[:6, :6] = dynamics
@@ -55,11 +55,11 @@ def integrated(
     limit: Sequence[float],
     tick: float,
 ) -> list[float]:
-    """The integral (3,), m s, after a tick (s) with a position error (3,), m.
+    """The integral (3,), m s, after a tick (s) of position error (3,), m.
 
-    Anti-wind-up: what an axis at its limit (3,), N, cannot give, more integral would not get.
+    Anti-windup by clamping: an axis whose force (3,), N, is at its limit (3,), N, does not integrate.
     """
     return [
-        total + off * tick if abs(value) < most else total
-        for total, off, value, most in zip(integral, error, force, limit, strict=True)
+        total + offset * tick if abs(value) < largest else total
+        for total, offset, value, largest in zip(integral, error, force, limit, strict=True)
     ]

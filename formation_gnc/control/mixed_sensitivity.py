@@ -1,11 +1,11 @@
-"""H-infinity synthesis of a position controller by mixed sensitivity (Neokleous ch. 5).
+"""Mixed-sensitivity H-infinity synthesis of a position controller (Neokleous ch. 5).
 
-The loop is y = G u + d with G from acceleration to relative position. With S = (I + G K)^-1, T = I - S, the
-controller u = -K y keeps the largest singular value of
+Plant y = G u + d with G from acceleration to relative position. With S = (I + G K)^-1 and T = I - S, the
+controller u = -K y bounds the largest singular value of
 
     [w_P S; w_T T; w_u K S]
 
-below gamma at all frequencies. Units of time are 1 / `rate` inside, so that numbers are of order one.
+by gamma at all frequencies. Internally the unit of time is 1 / `rate`, for coefficients of order one.
 """
 
 from dataclasses import dataclass
@@ -19,28 +19,29 @@ from formation_gnc.control.linear import LinearController
 from formation_gnc.errors import DesignError
 from formation_gnc.types import Matrix, Vector
 
-LARGEST_GAMMA = 1e6
+MAX_GAMMA = 1e6
+"""Bound on the search for a feasible gamma."""
 
 ACCURACY = 1e-3
-"""To which the best gamma is found, relative to it."""
+"""Relative accuracy of the optimal gamma."""
 
 
 @dataclass(frozen=True)
-class Weight:
-    """A first-order weight on each of the three channels: direct + residue / (s + pole)."""
+class WeightingFunction:
+    """A first-order weighting function on each of the three channels: direct + residue / (s + pole)."""
 
     direct: Vector
     residue: Vector
     pole: Vector
 
     @classmethod
-    def performance(cls, bandwidth: Vector, peak: Vector, steady: Vector) -> "Weight":
+    def performance(cls, bandwidth: Vector, peak: Vector, steady: Vector) -> "WeightingFunction":
         """w_P = (s / M + w_B) / (s + w_B A), whose inverse bounds S (Neokleous 5.7)."""
         pole = bandwidth * steady
         return cls(1.0 / peak, bandwidth - pole / peak, pole)
 
     @classmethod
-    def uncertainty(cls, time: Vector, low: Vector, high: Vector) -> "Weight":
+    def uncertainty(cls, time: Vector, low: Vector, high: Vector) -> "WeightingFunction":
         """w_T = (tau s + r_0) / (tau / r_inf s + 1), whose inverse bounds T (Neokleous 5.42)."""
         pole = high / time
         return cls(high, (low - high) * pole, pole)
@@ -51,35 +52,32 @@ class Weight:
 
 
 @dataclass(frozen=True)
-class Problem:
+class MixedSensitivityProblem:
     """A mixed-sensitivity problem in SI units, per channel (x, y, z of the Hill frame)."""
 
     dynamics: Matrix
-    """(6, 6) continuous matrix of relative motion."""
-    performance: Weight
-    uncertainty: Weight
+    """(6, 6) continuous system matrix of the relative motion, 1/s."""
+    performance: WeightingFunction
+    uncertainty: WeightingFunction
     effort: Vector
-    """(3,) w_u: position over acceleration, s^2."""
+    """(3,) w_u, position per acceleration, s^2."""
     pole_shift: float
-    """Shift e of the plant's poles to the right, 1/s: out of the imaginary axis (Neokleous 5.6)."""
+    """Shift e of the plant's poles to the right, off the imaginary axis, 1/s (Neokleous 5.6)."""
     disturbance: float
-    """Acceleration that counts like a metre of disturbance of the position, 1/s^2."""
+    """Acceleration disturbance equivalent to a metre of position disturbance, 1/s^2."""
 
     def synthesise(self, full_information: bool, margin: float) -> tuple[LinearController, float, float]:
-        """Controller in SI units, best gamma, and the gamma that it was designed for: (1 + margin) times the
-        best.
+        """Controller in SI units, the optimal gamma, and the gamma of the design, (1 + margin) times the optimal.
 
-        A controller at the best gamma itself has poles without bound.
+        At the optimal gamma itself the poles of the central controller are unbounded.
 
         Raises:
-            DesignError: poles on the imaginary axis, or no controller at any gamma.
+            DesignError: plant poles on the imaginary axis, or no gamma is feasible.
         """
         if not (self.pole_shift > 0.0 or self.disturbance > 0.0):
-            raise DesignError(
-                "the plant has poles on the imaginary axis: give a pole_shift or a disturbance above zero"
-            )
+            raise DesignError("the plant has poles on the imaginary axis; pole_shift or disturbance must be above zero")
         if full_information and not self.disturbance > 0.0:
-            raise DesignError("the full-information form needs a disturbance above zero to work against")
+            raise DesignError("disturbance is 0; it must be above zero for the full-information form")
         solve = self._full_information if full_information else self._output_feedback
         try:
             return solve(margin)
@@ -88,12 +86,14 @@ class Problem:
 
     @property
     def rate(self) -> float:
-        """Inverse of the unit of time of the scaled problem, 1/s."""
+        """Inverse of the scaled problem's unit of time, 1/s."""
         return float((self.performance.residue + self.performance.pole * self.performance.direct).max())
 
     def _scaled(self) -> tuple[Matrix, Matrix, Matrix, Vector, float]:
-        """A, B, C of plant with the states of w_P and w_T (12), then w_u and the disturbance, in units of
-        time 1 / rate."""
+        """A (12, 12), B (12, 3), C (6, 12) of the plant with the states of w_P and w_T, w_u (3,) and the disturbance.
+
+        In units of time 1 / rate.
+        """
         rate, eye, nil = self.rate, np.eye(3), np.zeros((3, 3))
         unit = np.repeat([1.0, rate], 3)
         a = np.zeros((12, 12))
@@ -111,6 +111,7 @@ class Problem:
         return a, b, c, self.effort * rate**2, self.disturbance / rate**2
 
     def _output_feedback(self, margin: float) -> tuple[LinearController, float, float]:
+        """Output feedback by SLICOT's SB10FD, gamma by bisection."""
         a, b2, c1, effort, disturbance = self._scaled()
         eye, nil = np.eye(3), np.zeros((3, 3))
         channels = np.vstack([nil, nil, eye, nil])
@@ -126,17 +127,16 @@ class Problem:
                 ak, bk, ck, dk, _ = slycot.sb10fd(12, 9, 12, 3, 3, gamma, a, b, c, d)
             except slycot.exceptions.SlycotError:
                 return None
-            # SB10FD leaves a condition unchecked, without which its controller does not stabilise.
+            # SB10FD does not check one existence condition, without which its controller does not stabilise.
             loop = np.block([[a + b2 @ dk @ c[9:], b2 @ ck], [bk @ c[9:], ak]])
             stable = np.isfinite(loop).all() and (np.linalg.eigvals(loop).real < 0.0).all()
             return self._unscaled(ak, bk, ck, dk, np.ones(3)) if stable else None
 
-        # By bisection, not by SLICOT's own search: that one call would keep all other threads waiting for a
-        # second.
+        # Own bisection: SLICOT's search is one call that holds the interpreter lock for a second.
         high = 1.0
         while central(high) is None:
             high *= 2.0
-            if high > LARGEST_GAMMA:
+            if high > MAX_GAMMA:
                 raise ArithmeticError(f"none up to gamma = {high:.3g}")
         low = 0.0 if high == 1.0 else 0.5 * high
         while high - low > ACCURACY * high:
@@ -149,29 +149,28 @@ class Problem:
         return controller, high, gamma
 
     def _full_information(self, margin: float) -> tuple[LinearController, float, float]:
+        """Central state feedback for an acceleration disturbance."""
         a, b, c, effort, disturbance = self._scaled()
-        # Disturbance and thrust come in at the same place. So the game's Riccati equation is that of an LQR
-        # whose thrust costs more, without bound as gamma falls to the gain from the disturbance to a thrust
-        # that just cancels it.
-        best = disturbance * float(effort.max())
-        gamma = (1.0 + margin) * best
-        price = effort**2 / (1.0 - (disturbance * effort / gamma) ** 2)
-        x = solve_continuous_are(a, b, c.T @ c, np.diag(price))
+        # Matched disturbance: the game's Riccati equation is that of an LQR with a higher cost of thrust, which
+        # is unbounded as gamma approaches the gain from the disturbance to the thrust that cancels it.
+        optimal = disturbance * float(effort.max())
+        gamma = (1.0 + margin) * optimal
+        thrust_weight = effort**2 / (1.0 - (disturbance * effort / gamma) ** 2)
+        x = solve_continuous_are(a, b, c.T @ c, np.diag(thrust_weight))
         feedback = -(b.T @ x) / effort[:, None] ** 2
         inputs = np.hstack([np.vstack([np.eye(3), np.eye(3)]), np.zeros((6, 3))])
         controller = self._unscaled(a[6:, 6:], inputs, feedback[:, 6:], feedback[:, :6], np.repeat([1.0, self.rate], 3))
-        return controller, best, gamma
+        return controller, optimal, gamma
 
     def _unscaled(self, a: Matrix, b: Matrix, c: Matrix, d: Matrix, unit: Vector) -> LinearController:
-        """The controller in SI units; `unit` is the SI size of one scaled unit of each measured error."""
+        """The controller in SI units; `unit` is the SI value of one scaled unit of each measured error."""
         rate = self.rate
         return LinearController(a * rate, b / unit * rate, c * rate**2, d / unit * rate**2)
 
     def singular_values(self, controller: LinearController, frequency: Vector) -> dict[str, Matrix]:
-        """Singular values (N, 3) of S, T, KS and T_I = K (I + G K)^-1 G over frequencies (N,), on the plant
-        itself."""
-        eye6, seen = np.eye(6), np.eye(6)[: controller.b.shape[1]]
-        result: dict[str, Any] = {"S": [], "T": [], "KS": [], "T_I": []}
+        """Singular values (N, 3) of S, T, KS and T_I = K (I + G K)^-1 G over frequencies (N,), unshifted plant."""
+        eye6, measured = np.eye(6), controller.b.shape[1]
+        result: dict[str, list[Any]] = {"S": [], "T": [], "KS": [], "T_I": []}
         b = np.vstack([np.zeros((3, 3)), np.eye(3)])
         for w in frequency:
             states = np.linalg.solve(1j * w * eye6 - self.dynamics, b)
@@ -179,7 +178,7 @@ class Problem:
                 controller.c @ np.linalg.solve(1j * w * np.eye(len(controller.a)) - controller.a, controller.b)
                 + controller.d
             )
-            if len(seen) == 6:  # a disturbance of the position is one of its rate as well
+            if measured == 6:  # a position disturbance disturbs its rate too
                 k = k @ np.vstack([np.eye(3), 1j * w * np.eye(3)])
             g = states[:3]
             s = np.linalg.inv(np.eye(3) + g @ k)

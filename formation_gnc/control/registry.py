@@ -1,5 +1,7 @@
 """All control laws by name: a new law is one file and one line here."""
 
+from typing import Any
+
 from formation_gnc.control.adaptive_lqr import AdaptiveLinearQuadraticRegulator
 from formation_gnc.control.asre import Asre
 from formation_gnc.control.coast import Coast
@@ -13,7 +15,7 @@ from formation_gnc.control.mpsp import MpspController
 from formation_gnc.control.sdre import Sdre
 from formation_gnc.control.sdre_finite import FiniteSdre
 
-ALGORITHMS: dict[str, type[Controller]] = {
+ALGORITHMS: dict[str, type[Controller[Any]]] = {
     "coast": Coast,
     "lqr": LinearQuadraticRegulator,
     "hinf": HInfinityController,
@@ -27,4 +29,4 @@ ALGORITHMS: dict[str, type[Controller]] = {
 }
 
 FINITE_HORIZONS = [name for name, law in ALGORITHMS.items() if issubclass(law, FiniteHorizonController)]
-"""Those of them that fly a reconfiguration in a given time."""
+"""The laws that complete a reconfiguration at a given final time."""

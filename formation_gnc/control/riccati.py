@@ -1,13 +1,12 @@
 """Riccati equations of linear quadratic control, solved by doubling.
 
-One step of the backward recursion is a map of the cost-to-go P,
+One step of the backward recursion maps the cost-to-go P to
 
-    P -> H + A' P (I + G P)^-1 A,   with H = Q and G = B R^-1 B',
+    H + A' P (I + G P)^-1 A,   with H = Q and G = B R^-1 B',
 
-and two such maps after one another are again such a map. So a thousand equal steps cost ten compositions, a
-whole orbit of unequal ones is one map, and the stabilising solution is what doubling converges to:
-quadratically, without ordering eigenvalues (Chu, Fan, Lin and Wang 2004, the structure-preserving doubling
-algorithm).
+and the composition of two such maps has the same form. A thousand equal steps cost ten compositions, an orbit
+of unequal steps reduces to one map, and repeated squaring converges quadratically to the stabilising solution
+without ordering eigenvalues (structure-preserving doubling algorithm: Chu, Fan, Lin and Wang 2004).
 """
 
 from collections.abc import Sequence
@@ -20,38 +19,37 @@ from scipy.linalg import LinAlgError, solve_continuous_are
 from formation_gnc.errors import DesignError
 from formation_gnc.types import Matrix, Vector
 
-LARGEST_DOUBLING = 60
-"""Doublings after which a solution that has not converged does not exist: 2^60 steps."""
+MAX_DOUBLINGS = 60
+"""Doublings without convergence, 2^60 steps, that count as no stabilising solution."""
 
 
 @dataclass(frozen=True)
 class RiccatiMap:
-    """The backward recursion over any number of steps: cost-to-go at their end to cost-to-go at their
-    start."""
+    """The backward recursion over any number of steps, from the cost-to-go at their end to that at their start."""
 
     transition: Matrix
-    """(n, n) A: how the state passes under the optimal thrust when nothing is at stake afterwards."""
-    reach: Matrix
-    """(n, n) G: what the thrust can reach per unit of its cost."""
+    """(n, n) A: state transition under the optimal input with zero terminal cost."""
+    gramian: Matrix
+    """(n, n) G: reachability Gramian, weighted by the inverse of the input's cost."""
     cost: Matrix
-    """(n, n) H: cost-to-go at the start when nothing is at stake afterwards."""
+    """(n, n) H: cost-to-go at the start with zero terminal cost."""
 
     @classmethod
     def of_step(cls, phi: Matrix, gamma: Matrix, state_weight: Matrix, input_weight: Matrix) -> "RiccatiMap":
-        """One step of x' = phi x + gamma u with the cost x' Q x + u' R u."""
+        """One step of x+ = phi x + gamma u with the stage cost x' Q x + u' R u."""
         return cls(phi, gamma @ np.linalg.solve(input_weight, gamma.T), state_weight)
 
     def then(self, later: "RiccatiMap") -> "RiccatiMap":
-        """These steps and then the later ones."""
+        """Composition: these steps, followed by the later ones."""
         size = len(self.cost)
-        both = np.linalg.solve(np.eye(size) + self.reach @ later.cost, np.hstack([self.transition, self.reach]))
-        onward, spread = both[:, :size], both[:, size:]
-        reach = later.reach + later.transition @ spread @ later.transition.T
-        cost = self.cost + self.transition.T @ later.cost @ onward
-        return RiccatiMap(later.transition @ onward, 0.5 * (reach + reach.T), 0.5 * (cost + cost.T))
+        both = np.linalg.solve(np.eye(size) + self.gramian @ later.cost, np.hstack([self.transition, self.gramian]))
+        transition, spread = both[:, :size], both[:, size:]
+        gramian = later.gramian + later.transition @ spread @ later.transition.T
+        cost = self.cost + self.transition.T @ later.cost @ transition
+        return RiccatiMap(later.transition @ transition, 0.5 * (gramian + gramian.T), 0.5 * (cost + cost.T))
 
     def repeated(self, times: int) -> "RiccatiMap":
-        """These steps, one or more times over."""
+        """Composition of these steps with themselves, `times` >= 1 in all."""
         if times == 1:
             return self
         half = self.repeated(times // 2)
@@ -62,18 +60,18 @@ class RiccatiMap:
         """(n, n) cost-to-go at the start for a cost-to-go at the end."""
         size = len(self.cost)
         result = self.cost + self.transition.T @ cost_to_go @ np.linalg.solve(
-            np.eye(size) + self.reach @ cost_to_go, self.transition
+            np.eye(size) + self.gramian @ cost_to_go, self.transition
         )
         return 0.5 * (result + result.T)
 
     def stabilising(self) -> Matrix:
-        """(n, n) cost-to-go when these steps are repeated for ever.
+        """(n, n) stabilising fixed point: the cost-to-go of these steps over an infinite horizon.
 
         Raises:
-            DesignError: the thrust cannot stabilise what the weights see.
+            DesignError: no stabilising solution: a mode is not stabilisable, or not detectable in the cost.
         """
         power = self
-        for _ in range(LARGEST_DOUBLING):
+        for _ in range(MAX_DOUBLINGS):
             with np.errstate(all="ignore"):
                 try:
                     twice = power.then(power)
@@ -90,10 +88,10 @@ class RiccatiMap:
 
 @dataclass(frozen=True)
 class Weights:
-    """Cost x' Q x + u' R u of one step, in units in which states, inputs and cost are all of order one.
+    """Stage cost x' Q x + u' R u, scaled so that states, inputs and cost are of order one.
 
-    SI numbers of orbital motion span ten orders of magnitude, and no Riccati solver stands that. So a state
-    counts in units of length, length times rate, and length over rate for an integral; the rate is about the
+    In SI units the coefficients span ten orders of magnitude and the Riccati equation is ill-conditioned. The
+    states are scaled by length, length times rate, and length over rate (integral), with the rate close to the
     closed loop's bandwidth.
     """
 
@@ -110,11 +108,10 @@ class Weights:
 
     @classmethod
     def scaled(cls, state_weight: Matrix, input_weight: Matrix, tick: float) -> "Weights":
-        """Choose units for SI weights Q (6, 6), or (9, 9) with the integral of position, and R (3, 3) on
-        acceleration.
+        """Scale SI weights Q (6, 6), or (9, 9) with the integral of position, and R (3, 3) on acceleration.
 
         Raises:
-            DesignError: Q has a negative eigenvalue, or R one that is not positive.
+            DesignError: Q is not positive semidefinite, or R not positive definite.
         """
         for name, weight, least in (("state", state_weight, 0.0), ("thrust", input_weight, 1e-12)):
             size = np.sqrt(np.maximum(np.diag(weight), 0.0))
@@ -136,7 +133,7 @@ class Weights:
         if rate == 0.0:
             raise DesignError("the state weight is zero: nothing to control")
         rate = min(rate, 1.0 / tick)
-        # The unit of length is free: one unit of acceleration at this rate.
+        # Unit of length: one unit of acceleration over rate squared.
         state_unit = np.repeat([1.0, rate, 1.0 / rate], 3)[: len(state_weight)]
         input_unit = np.full(3, rate**2)
         cost = (thrust**2).min() * rate**4
@@ -149,28 +146,26 @@ class Weights:
         )
 
     def step(self, phi: Matrix, gamma: Matrix) -> tuple[Matrix, Matrix]:
-        """Scaled phi and gamma of SI ones."""
+        """Scaled phi (n, n) and gamma (n, m) from SI ones."""
         return (
             phi * np.outer(1.0 / self.state_unit, self.state_unit),
             gamma * np.outer(1.0 / self.state_unit, self.input_unit),
         )
 
     def map(self, phi: Matrix, gamma: Matrix) -> RiccatiMap:
-        """The recursion over one step of SI phi and gamma."""
+        """The Riccati map of one step with SI phi (n, n) and gamma (n, m)."""
         return RiccatiMap.of_step(*self.step(phi, gamma), self.state, self.input)
 
     def gain(self, phi: Matrix, gamma: Matrix, cost_to_go: Matrix) -> Matrix:
-        """(m, n) SI gain K of u = -K x over a step of SI phi and gamma, for the scaled cost-to-go after
-        it."""
+        """(m, n) SI gain K of u = -K x over a step of SI phi and gamma; the cost-to-go (n, n) after it is scaled."""
         scaled_phi, scaled_gamma = self.step(phi, gamma)
-        reach = scaled_gamma.T @ cost_to_go
-        gain = np.linalg.solve(self.input + reach @ scaled_gamma, reach @ scaled_phi)
+        weighted = scaled_gamma.T @ cost_to_go
+        gain = np.linalg.solve(self.input + weighted @ scaled_gamma, weighted @ scaled_phi)
         return np.asarray(gain, dtype=np.float64) * np.outer(self.input_unit, 1.0 / self.state_unit)
 
 
 def stationary_gain(phi: Matrix, gamma: Matrix, weights: Weights) -> Matrix:
-    """Gain K (3, n) of the infinite-horizon discrete LQR u = -K x for x' = phi x + gamma u (Neokleous
-    4.29-4.30).
+    """Gain K (3, n) of the infinite-horizon discrete LQR u = -K x for x+ = phi x + gamma u (Neokleous 4.29-4.30).
 
     Raises:
         DesignError: no stabilising solution.
@@ -193,9 +188,9 @@ def continuous_gain(dynamics: Matrix, inputs: Matrix, weights: Weights) -> Matri
 
 
 def continuous_cost_to_go(dynamics: Matrix, inputs: Matrix, weights: Weights) -> tuple[Matrix, Matrix]:
-    """Scaled cost-to-go P (n, n) behind `continuous_gain`, and B scaled likewise.
+    """Scaled cost-to-go P (n, n) of `continuous_gain`, and the scaled B (n, 3).
 
-    Time counts in units of 1 / rate, with the rate the root of `weights.input_unit`.
+    The unit of time is 1 / rate, with rate^2 = `weights.input_unit`.
 
     Raises:
         DesignError: no stabilising solution.
@@ -209,10 +204,9 @@ def continuous_cost_to_go(dynamics: Matrix, inputs: Matrix, weights: Weights) ->
 
 
 def finite_gains(phi: Matrix, gamma: Matrix, weights: Weights, terminal_weight: Matrix, steps: int) -> Matrix:
-    """Gains K (steps, 3, n) that minimise the cost over a number of steps plus x' S x after the last
-    (Neokleous 4.21).
+    """Gains K (steps, 3, n) of the finite-horizon LQR with terminal cost x' S x (Neokleous 4.21).
 
-    `terminal_weight` is S (n, n), in the units of the Q and R that `weights` was made from.
+    `terminal_weight` is S (n, n) in SI units.
     """
     cost_to_go = terminal_weight * np.outer(weights.state_unit, weights.state_unit) / weights.cost_unit
     one = weights.map(phi, gamma)
@@ -224,36 +218,36 @@ def finite_gains(phi: Matrix, gamma: Matrix, weights: Weights, terminal_weight: 
 
 
 def periodic_gains(models: Sequence[tuple[Matrix, Matrix]], repeats: int, weights: Weights) -> Matrix:
-    """Gains K (N, 3, n) of the periodic LQR: the discrete periodic Riccati equation over one orbit.
+    """Gains K (N, 3, n) of the periodic LQR, from the discrete periodic Riccati equation over one orbit.
 
     Args:
-        models: N pairs phi (n, n), gamma (n, 3) of one tick, equally spaced over the orbit.
-        repeats: ticks for which each of them stands.
-        weights: the cost of every tick.
+        models: N pairs phi (n, n), gamma (n, 3) of one tick, at N equal intervals of the orbit.
+        repeats: ticks per interval.
+        weights: stage cost of a tick.
 
     Raises:
         DesignError: no stabilising periodic solution.
     """
     ends = np.roll(periodic_cost_to_go(models, repeats, weights), -1, axis=0)
     gains = np.empty((len(models), 3, len(weights.state)))
-    turn = np.eye(len(weights.state))
+    monodromy = np.eye(len(weights.state))
     for index, ((phi, gamma), end) in enumerate(zip(models, ends, strict=True)):
         middle = weights.map(phi, gamma).repeated((repeats + 1) // 2).backward(end)
         gains[index] = weights.gain(phi, gamma, middle)
         closed = (phi - gamma @ gains[index]) * np.outer(1.0 / weights.state_unit, weights.state_unit)
-        turn = np.linalg.matrix_power(closed, repeats) @ turn
-    if not spectral_radius(turn) < 1.0:
+        monodromy = np.linalg.matrix_power(closed, repeats) @ monodromy
+    if not spectral_radius(monodromy) < 1.0:
         raise DesignError("the closed loop of these weights is not stable over an orbit")
     return gains
 
 
 def periodic_cost_to_go(models: Sequence[tuple[Matrix, Matrix]], repeats: int, weights: Weights) -> Matrix:
-    """Scaled cost-to-go P (N, n, n) at the start of each of N stretches of an orbit; as `periodic_gains`."""
-    stretches = [weights.map(phi, gamma).repeated(repeats) for phi, gamma in models]
+    """Scaled cost-to-go P (N, n, n) at the start of each of N intervals of an orbit; arguments as `periodic_gains`."""
+    intervals = [weights.map(phi, gamma).repeated(repeats) for phi, gamma in models]
     result = np.empty((len(models), *weights.state.shape))
-    cost_to_go = reduce(RiccatiMap.then, stretches).stabilising()
+    cost_to_go = reduce(RiccatiMap.then, intervals).stabilising()
     for index in reversed(range(len(models))):
-        result[index] = cost_to_go = stretches[index].backward(cost_to_go)
+        result[index] = cost_to_go = intervals[index].backward(cost_to_go)
     return result
 
 

@@ -1,4 +1,4 @@
-"""Infinite-time state-dependent Riccati equation."""
+"""Infinite-horizon state-dependent Riccati equation (SDRE) control."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +9,7 @@ from formation_gnc.common import CommonParameters
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
 from formation_gnc.control.feed_forward import FeedForward
 from formation_gnc.control.finite_horizon import PLAN_MODELS
-from formation_gnc.control.fixed_endpoint_lq import FACTORISATIONS, discretised, state_dependent
+from formation_gnc.control.fixed_endpoint_lq import FACTORISATIONS, discretise, state_dependent
 from formation_gnc.control.integral import IntegralWeights, integrated, with_integral
 from formation_gnc.control.lqr import LinearQuadraticRegulator, LqrParameters
 from formation_gnc.control.riccati import Weights, stationary_gain
@@ -24,53 +24,53 @@ from formation_gnc.types import NANOSECONDS, Matrix, Vector
 
 @dataclass(frozen=True)
 class SdreParameters(IntegralWeights):
-    """Weights, equations of motion and their factorisation."""
+    """Weights, model and its factorisation."""
 
     model: str = parameter(
         "oblate",
         choices=tuple(PLAN_MODELS),
         in_flight=True,
-        doc="exact relative motion that is factorised: of point masses, or with J2 (oblate)",
+        doc="nonlinear relative motion to factorise: point-mass gravity, or with J2 (oblate)",
     )
     factorisation: str = parameter(
         "sdc1",
         choices=tuple(FACTORISATIONS),
         in_flight=True,
-        doc="A(x) x of the equations of motion: about any chief (sdc1) or a circular one (sdc2)",
+        doc="state-dependent coefficients of the equations of motion: any chief orbit (sdc1), circular (sdc2)",
     )
     update_interval: float = parameter(
         60.0,
         unit="s",
         minimum=0.0,
         in_flight=True,
-        doc="time for which one gain is flown; 0 solves at every tick",
+        doc="time between gain updates; 0 updates at every tick",
     )
     feed_forward: str = parameter(
         "none",
         choices=("none", "nonlinear"),
         in_flight=True,
-        doc="as lqr.feed_forward: what the target asks beyond free motion; takes a preview of the target",
+        doc="as lqr.feed_forward: acceleration of the target relative to free motion; requires a preview",
     )
 
 
-class Sdre(Controller):
-    """LQR whose gain is that of the equations of motion as they are at the estimate (Joshi 5.1).
+class Sdre(Controller[SdreParameters]):
+    """LQR with the gain of the factorised equations of motion at the estimate (Joshi 5.1).
 
     u = -K(x) (x - x_d) - K_I(x) integral + (A(x_d) - A(x)) x_d + feed-forward, with K from the discrete
-    Riccati equation of A(x), solved again and again (5.4)-(5.7). With x' = A(x) x and a target in free flight
-    the third term is what (4.13) leaves of the error's equation, in the sign that helps. A gain that does not
-    exist is named, and LQR on Hill's equations flies, on the same weights.
+    Riccati equation of A(x), solved every `update_interval` (5.4)-(5.7). The third term is the remainder of
+    (4.13), sign corrected, in the error dynamics of a target in free motion. Without a stabilising gain, an
+    LQR on Hill's equations with the same weights is active and the command gives the reason.
 
     With `integral_error`, an axis at its thrust limit does not integrate, and a change of parameters keeps
     the integral.
 
-    Assumes: what the model assumes; matrices that change little within the loop's time constant.
+    Assumes: matrices that vary little within the closed loop's time constant; the model's assumptions.
     """
 
     Parameters = SdreParameters
 
     def __init__(self, parameters: SdreParameters, common: CommonParameters, vehicle: Vehicle) -> None:
-        """Scale the weights and design the law in reserve.
+        """Scale the weights and design the fallback law.
 
         Raises:
             DesignError: inadmissible weights.
@@ -87,23 +87,23 @@ class Sdre(Controller):
             self._weights = Weights.scaled(parameters.joint_matrix(), r, common.tick)
         except DesignError as error:
             raise DesignError(f"sdre: {error}") from error
-        self.reserve = LinearQuadraticRegulator(LqrParameters(**parameters.weights()), common, vehicle)
+        self.fallback_law = LinearQuadraticRegulator(LqrParameters(**parameters.weights()), common, vehicle)
         self._feed_forward = FeedForward(parameters.feed_forward, HillModel(common.mean_motion))
 
     def figures(self) -> dict[str, Any]:
-        """The gain on force for a deputy at the chief, where the chief is at the start."""
+        """The gain on force at zero relative state and the initial chief state."""
         model = PLAN_MODELS[self._parameters.model](Elements(**vars(self._chief)))
         system = state_dependent(model, self._parameters.factorisation, np.zeros(1))
         gain = self.gain(system(np.zeros((1, 6)))[0][0])
-        return {"gain at the chief, at the start [N/m, N/(m/s), N/(m s)]": (self._mass * gain).tolist()}
+        return {"initial gain at the chief [N/m, N/(m/s), N/(m s)]": (self._mass * gain).tolist()}
 
     def activate(self, handover: Handover) -> None:
-        """Keep the integral of an SDRE that flew before."""
+        """Take over the integral of a previous SDRE law."""
         if self._integrates and isinstance(handover.law, Sdre):
             self._integral = handover.law._integral or self._integral
 
     def gain(self, dynamics: Matrix) -> Matrix:
-        """Gain K (3, n) of the discrete LQR for A(x) (6, 6) held, with the integral of position if any.
+        """Gain K (3, n) of the discrete LQR for A(x) (6, 6) held over a tick, n = 9 with integral action, else 6.
 
         Raises:
             DesignError: no stabilising solution.
@@ -112,13 +112,13 @@ class Sdre(Controller):
         if self._integrates:
             dynamics, inputs = with_integral(dynamics, inputs)
         held = (3, *dynamics.shape)
-        phi, gamma = discretised(
+        phi, gamma = discretise(
             np.broadcast_to(dynamics, held), np.broadcast_to(inputs, (3, *inputs.shape)), self._tick
         )
         return stationary_gain(phi[0], gamma[0], self._weights)
 
-    def _update(self, time: int, dynamics: Matrix) -> Matrix:
-        """The gain in force, solved anew when it is time."""
+    def _current_gain(self, time: int, dynamics: Matrix) -> Matrix:
+        """The gain in force, updated when due; raises DesignError when there is none."""
         since = None if self._updated_at is None else (time - self._updated_at) / NANOSECONDS
         if since is None or not 0.0 <= since < self._parameters.update_interval:
             self._updated_at = time
@@ -131,21 +131,21 @@ class Sdre(Controller):
         return self._gain
 
     def command(self, estimate: NavigationState, target: Target) -> Command:
-        """The force that the gain of now asks for against the estimated error, and what the target needs."""
+        """Feedback with the current gain, plus the feed-forward terms."""
         state, goal = estimate.relative_state, target.relative_state
         error = state - goal
         try:
             model = PLAN_MODELS[self._parameters.model](elements_from_state(estimate.chief_state))
-            (here, there), _ = state_dependent(model, self._parameters.factorisation, np.zeros(2))(
+            (at_state, at_goal), _ = state_dependent(model, self._parameters.factorisation, np.zeros(2))(
                 np.array([state, goal])
             )
-            gain = self._update(estimate.time, here)
+            gain = self._current_gain(estimate.time, at_state)
         except (ConfigurationError, ArithmeticError) as reason:
-            reserve = self.reserve.command(estimate, target)
-            return Command(reserve.force, fallback=f"no gain: {reason}; LQR flies")
+            force = self.fallback_law.command(estimate, target).force
+            return Command(force, fallback=f"no gain: {reason}; LQR active")
         acceleration: Vector = -gain[:, :6] @ error - gain[:, 6:] @ np.array(self._integral)
-        wanted, reason_of_none = self._feed_forward(estimate, target)
-        force = estimate.mass * (acceleration + ((there - here) @ goal)[3:] + wanted)
+        feed_forward, unavailable = self._feed_forward(estimate, target)
+        force = estimate.mass * (acceleration + ((at_goal - at_state) @ goal)[3:] + feed_forward)
         if self._integrates:
             self._integral = integrated(self._integral, error[:3].tolist(), force.tolist(), self._limit, self._tick)
-        return Command(force, fallback=reason_of_none)
+        return Command(force, fallback=unavailable)

@@ -1,4 +1,4 @@
-"""Weights of a quadratic cost, as a user gives them."""
+"""Weights of a quadratic cost as parameters."""
 
 from dataclasses import dataclass, fields
 from typing import Any
@@ -12,9 +12,9 @@ from formation_gnc.types import Matrix, Vector
 
 @dataclass(frozen=True)
 class QuadraticWeights:
-    """Weights by Bryson's rule, each the size that costs as much as any other, or as matrices.
+    """Weights by Bryson's rule, each the deviation with unit cost, or as matrices.
 
-    A base of the parameters of every law with a quadratic cost.
+    Base of the parameters of every law with a quadratic cost.
     """
 
     position_error: tuple[float, ...] = parameter(
@@ -23,7 +23,7 @@ class QuadraticWeights:
         length=3,
         above=0.0,
         in_flight=True,
-        doc="position error that weighs one, per Hill axis",
+        doc="position error with unit cost, per Hill axis",
     )
     velocity_error: tuple[float, ...] = parameter(
         (0.01, 0.01, 0.01),
@@ -31,7 +31,7 @@ class QuadraticWeights:
         length=3,
         above=0.0,
         in_flight=True,
-        doc="velocity error that weighs one, per Hill axis",
+        doc="velocity error with unit cost, per Hill axis",
     )
     thrust: tuple[float, ...] = parameter(
         (0.01, 0.01, 0.01),
@@ -39,32 +39,32 @@ class QuadraticWeights:
         length=3,
         above=0.0,
         in_flight=True,
-        doc="force that weighs one, per Hill axis",
+        doc="force with unit cost, per Hill axis",
     )
     state_weight: tuple[float, ...] = parameter(
         (),
         in_flight=True,
-        doc="weight Q (6 x 6, row by row, SI) in place of position_error and velocity_error",
+        doc="state weight Q (6 x 6, row by row, SI) instead of position_error and velocity_error",
     )
     thrust_weight: tuple[float, ...] = parameter(
-        (), unit="1/N^2", in_flight=True, doc="weight R on force (3 x 3, row by row) in place of thrust"
+        (), unit="1/N^2", in_flight=True, doc="weight R on force (3 x 3, row by row) instead of thrust"
     )
 
     def state_matrix(self) -> Matrix:
-        """Q (6, 6), SI units; raises DesignError for a matrix with the wrong number of elements."""
+        """Q (6, 6), SI units; raises DesignError for a wrong number of elements."""
         return _matrix("state_weight", self.state_weight, self.position_error + self.velocity_error)
 
     def thrust_matrix(self) -> Matrix:
-        """R (3, 3) on force, 1/N^2; raises DesignError for a matrix with the wrong number of elements."""
+        """R (3, 3) on force, 1/N^2; raises DesignError for a wrong number of elements."""
         return _matrix("thrust_weight", self.thrust_weight, self.thrust)
 
     def weights(self) -> dict[str, Any]:
-        """These parameters alone, for another law with the same cost."""
+        """These fields by name, for the parameters of another law with the same cost."""
         return {field.name: getattr(self, field.name) for field in fields(QuadraticWeights)}
 
 
 def _matrix(name: str, values: tuple[float, ...], allowed: tuple[float, ...]) -> Matrix:
-    """The matrix that is given, or Bryson's rule."""
+    """The given matrix, or that of Bryson's rule."""
     size = len(allowed)
     if not values:
         bryson: Vector = np.array(allowed) ** -2.0

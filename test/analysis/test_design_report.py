@@ -29,9 +29,9 @@ def test_every_law_is_described_and_drawn(algorithm, tmp_path):
         assert np.abs(designed.recovery[0, 1:] - 1.0).max() == 0.0
 
 
-def test_lqr_margins_are_those_that_theory_promises():
-    # A continuous LQR with equal weights on the inputs has a gain margin of 1/2 to infinity and 60 degrees at
-    # once in all of them; the tick takes a little of both (Safonov and Athans 1977).
+def test_lqr_has_the_guaranteed_margins():
+    # Continuous LQR with equal input weights: gain margin 1/2 to infinity or phase margin 60 degrees in all
+    # channels at once (Safonov and Athans 1977); slightly reduced by sampling.
     designed = described(algorithm="lqr", tick=1.0)
     assert designed.figures["largest S_I"] < 1.01
     assert designed.figures["phase margin [deg]"] > 59.0
@@ -41,9 +41,9 @@ def test_lqr_margins_are_those_that_theory_promises():
 
 @pytest.mark.parametrize("changes", [{}, {"lqr__integral_error": 3000.0}, {"algorithm": "hinf"}])
 def test_the_loop_stays_stable_up_to_the_gain_margin(changes):
-    # The same thing from the other side: scale the thrust and close the loop.
+    # Scale the thrust and close the loop.
     parameters = load(ControllerParameters, VALUES | {k.replace("__", "."): v for k, v in changes.items()})
-    own = getattr(parameters, parameters.algorithm)
+    own = parameters.laws[parameters.algorithm]
     law = ALGORITHMS[parameters.algorithm](own, parameters, Vehicle(100.0, np.full(3, 0.01)))
     margins, controller = design(parameters).figures, law.linear(0)
     phi, gamma = DESIGN_MODELS[own.model](parameters).discretise(0.0, parameters.tick)
@@ -53,15 +53,14 @@ def test_the_loop_stays_stable_up_to_the_gain_margin(changes):
         assert np.abs(np.linalg.eigvals(controller.closed_loop(phi, gamma * share))).max() < 1.0
 
 
-def test_hinf_keeps_its_bounds_in_the_picture():
+def test_hinf_singular_values_stay_below_their_bounds():
     values = described(algorithm="hinf").singular_values
     for name, bound in {"S": "gamma / w_P", "T": "gamma / w_T", "KS [N/m]": "gamma / w_u [N/m]"}.items():
         assert (values[name].max(axis=1) <= values[bound].min(axis=1)).all()
 
 
-def test_a_loop_along_the_orbit_has_characteristic_exponents():
-    # Every gain stabilises the model as it is at its place; only over a revolution is that one loop. On a
-    # circular orbit the exponents are the poles of the loop that does not vary.
+def test_a_periodic_loop_has_characteristic_exponents():
+    # On a circular orbit the exponents are the poles of the time-invariant loop.
     circular = described(algorithm="lqr", lqr__model="tschauner_hempel", lqr__gain="periodic")
     constant = described(algorithm="lqr")
     np.testing.assert_allclose(circular.poles.real, constant.poles.real, rtol=1e-3)
@@ -77,7 +76,7 @@ def test_a_loop_along_the_orbit_has_characteristic_exponents():
     assert np.abs(eccentric.recovery[-1, 1:]).max() < 0.1
 
 
-def test_the_size_of_the_programme():
+def test_the_figures_of_mpc_have_the_size_of_the_qp():
     figures = described(algorithm="mpc", mpc__horizon=20, mpc__total_thrust=0.01).figures
     assert figures["variables"] == 60
     assert figures["constraints"] == 60 + 20 * 10

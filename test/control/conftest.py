@@ -23,7 +23,7 @@ def vehicle() -> Vehicle:
 
 @pytest.fixture(scope="session")
 def estimate() -> Callable[..., NavigationState]:
-    """What an estimate says of a relative state at a time (s)."""
+    """Builder of the estimate of a relative state at a time (s)."""
 
     def build(state: Vector, time: float = 0.0, mass: float = 100.0, chief: Vector | None = None) -> NavigationState:
         return NavigationState(
@@ -38,7 +38,7 @@ def estimate() -> Callable[..., NavigationState]:
 
 @pytest.fixture(scope="session")
 def target() -> Callable[..., Target]:
-    """A target state at a time (s), with or without a preview, eclipses (s) and neighbours."""
+    """Builder of a target at a time (s), optionally with preview, eclipses (s) and neighbours."""
 
     def build(
         state: Vector | None = None,

@@ -1,4 +1,4 @@
-"""What holds for every law in the registry, whatever comes in."""
+"""Properties of every law in the registry, for any input."""
 
 from typing import Any
 
@@ -17,28 +17,28 @@ from formation_gnc.types import NANOSECONDS
 
 CHIEF = state_from_elements(Elements(6978100.0, 0.0, 1.48, 0.0, 0.0, 0.0))
 LIMIT = np.array([0.01, 0.02, 0.0])
-"""N; and one axis that cannot push."""
+"""N; one axis without thrust."""
 STRONG = np.full(3, 50.0)
-"""N: plans to go some kilometres in 300 s ask less."""
+"""N; above the demand of a transfer of some kilometres in 300 s."""
 
 
-def autopilot(algorithm: str, **values: Any) -> ControllerManager:
+def manager_of(algorithm: str, **values: Any) -> ControllerManager:
     basis = {"chief.semi_major_axis": 6978100.0, "tick": 10.0, "thrust_limit": tuple(LIMIT)}
     own = {key.replace("__", "."): value for key, value in values.items()}
     if algorithm in FINITE_HORIZONS:
-        own[f"{algorithm}.final_time"] = 300.0  # short plans are soon made
+        own[f"{algorithm}.final_time"] = 300.0  # short plans are cheap
     return ControllerManager("controller", load(ControllerParameters, {"algorithm": algorithm} | basis | own))
 
 
 def arrays(shape: Any, size: float) -> st.SearchStrategy[Any]:
-    """Arrays as they come in flight, and such as no flight has."""
+    """Arrays of flight-like values, or of any floats."""
     sane = hnp.arrays(float, shape, elements=st.floats(-size, size))
     return sane | hnp.arrays(float, shape, elements=st.floats(allow_nan=True, allow_infinity=True))
 
 
 @st.composite
 def ticks(draw: Any) -> dict[str, Any]:
-    """What comes in at a tick."""
+    """Inputs of a tick."""
     sane = st.integers(0, 10_000 * NANOSECONDS)
     times = hnp.arrays(np.int64, (draw(st.integers(0, 2)), 2), elements=sane | st.integers(-(2**63), 2**63 - 1))
     return {
@@ -55,9 +55,9 @@ def ticks(draw: Any) -> dict[str, Any]:
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 @settings(deadline=None, max_examples=12)
 @given(flight=st.lists(ticks(), min_size=1, max_size=4), limit=st.sampled_from([LIMIT, STRONG]))
-def test_a_command_is_never_nan_and_never_above_the_limit(algorithm, flight, limit, estimate, target):
+def test_the_thrust_is_finite_and_within_the_limit(algorithm, flight, limit, estimate, target):
     mpc = {"mpc__keep_out_radius": 20.0, "mpc__off_in_eclipse": True, "mpc__horizon": 40}
-    pilot = autopilot(algorithm, thrust_limit=tuple(limit), **mpc)
+    manager = manager_of(algorithm, thrust_limit=tuple(limit), **mpc)
     for tick, each in enumerate(flight):
         seen = estimate(each["state"], 10.0 * tick, each["mass"], each["chief"])
         aim = target(
@@ -67,7 +67,7 @@ def test_a_command_is_never_nan_and_never_above_the_limit(algorithm, flight, lim
             neighbours=each["neighbours"],
         )
         aim.eclipses = each["eclipses"]
-        thrust, status = pilot.on_tick(seen, aim)
+        thrust, status = manager.on_tick(seen, aim)
         assert np.isfinite(thrust.force).all()
         assert (np.abs(thrust.force) <= limit).all()
         assert np.isfinite(status.demand).all()
@@ -76,50 +76,50 @@ def test_a_command_is_never_nan_and_never_above_the_limit(algorithm, flight, lim
             assert status.fallback == "estimate not finite: no thrust"
 
 
-places, speeds = (st.tuples(*[st.floats(-size, size)] * 3) for size in (1e3, 1.0))
+positions, velocities = (st.tuples(*[st.floats(-size, size)] * 3) for size in (1e3, 1.0))
 
 
 @pytest.mark.parametrize("algorithm", FINITE_HORIZONS)
 @settings(deadline=None, max_examples=12)
-@given(place=places, speed=speeds, goal=places)
-def test_a_sane_reconfiguration_is_planned_and_flown(algorithm, place, speed, goal, estimate, target):
-    pilot = autopilot(algorithm, thrust_limit=tuple(STRONG))
+@given(position=positions, velocity=velocities, goal=positions)
+def test_a_feasible_reconfiguration_is_planned_and_followed(algorithm, position, velocity, goal, estimate, target):
+    manager = manager_of(algorithm, thrust_limit=tuple(STRONG))
     for time, solver in ((0.0, "planned"), (10.0, "following")):
-        seen, aim = estimate([*place, *speed], time, chief=CHIEF), target([*goal, 0.0, 0.0, 0.0], time)
-        thrust, status = pilot.on_tick(seen, aim)
+        seen, aim = estimate([*position, *velocity], time, chief=CHIEF), target([*goal, 0.0, 0.0, 0.0], time)
+        thrust, status = manager.on_tick(seen, aim)
         assert (status.solver, status.fallback) == (solver, "")
         np.testing.assert_array_equal(thrust.force, status.demand)
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
-def test_after_whatever_came_in_the_law_flies_on(algorithm, estimate, target):
-    pilot, state = autopilot(algorithm, mpc__thrust_rate=1e-4), np.array([5.0, -8.0, 0.0, 0.0, 0.0, 0.0])
+def test_the_law_recovers_after_invalid_inputs(algorithm, estimate, target):
+    manager, state = manager_of(algorithm, mpc__thrust_rate=1e-4), np.array([5.0, -8.0, 0.0, 0.0, 0.0, 0.0])
     huge = np.array([1e308, -1e308, 1e308, -1e308, 1e308, -1e308])
     bad = [np.full(6, np.nan), np.full(6, np.inf), huge, np.full(6, 1e200), np.full(6, 1e15)]
     for tick, wrong in enumerate([*bad, *bad, *[state] * 20]):
         mass = np.nan if tick < len(bad) else 100.0
         seen = estimate(wrong, 10.0 * tick, mass, CHIEF)
-        thrust, _ = pilot.on_tick(seen, target(time=10.0 * tick))
+        thrust, _ = manager.on_tick(seen, target(time=10.0 * tick))
     assert thrust.force.any() == (algorithm != "coast")
 
 
 @pytest.mark.parametrize("mass", [-100.0, 0.0, np.inf, np.nan])
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
-def test_with_a_mass_that_none_has_nothing_is_thrust_and_the_law_flies_on(algorithm, mass, estimate, target):
-    """A force is mass times acceleration: with a mass below zero every law would thrust the wrong way."""
-    pilot, away = autopilot(algorithm), [5.0, -8.0, 0.0, 0.0, 0.0, 0.0]
+def test_an_invalid_mass_gives_no_thrust_and_the_law_recovers(algorithm, mass, estimate, target):
+    """Force is mass times acceleration: a negative mass would reverse the thrust of every law."""
+    manager, away = manager_of(algorithm), [5.0, -8.0, 0.0, 0.0, 0.0, 0.0]
     reason = f"mass is {mass:g} kg; it must be positive and finite: no thrust"
     for time in (0.0, 10.0):
-        thrust, status = pilot.on_tick(estimate(away, time, mass, CHIEF), target(time=time))
+        thrust, status = manager.on_tick(estimate(away, time, mass, CHIEF), target(time=time))
         assert not thrust.force.any()
         assert status.fallback == reason
-    thrust, _ = pilot.on_tick(estimate(away, 20.0, chief=CHIEF), target(time=20.0))
+    thrust, _ = manager.on_tick(estimate(away, 20.0, chief=CHIEF), target(time=20.0))
     assert thrust.force.any() == (algorithm != "coast")
-    first, over = [event for event in pilot.take_events() if event.kind == EventKind.FALLBACK]
+    first, over = [event for event in manager.take_events() if event.kind == EventKind.FALLBACK]
     assert (first.detail, over.time) == (reason, 20 * NANOSECONDS)
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
-def test_no_thrust_limit_at_all_is_rejected(algorithm):
+def test_a_thrust_limit_of_zero_is_rejected(algorithm):
     with pytest.raises(ValueError, match=r"thrust_limit: .* is not allowed; one axis must push"):
-        autopilot(algorithm, thrust_limit=(0.0, 0.0, 0.0))
+        manager_of(algorithm, thrust_limit=(0.0, 0.0, 0.0))

@@ -1,4 +1,4 @@
-"""Two-point problems against least squares, the Hamiltonian's transition matrix and the nonlinear truth."""
+"""Fixed end-point LQ against least squares, the Hamiltonian transition matrix and nonlinear propagation."""
 
 import numpy as np
 import pytest
@@ -8,9 +8,9 @@ from scipy.linalg import block_diag, expm
 from formation_gnc.control.fixed_endpoint_lq import (
     Cost,
     approximating_sequence,
-    discretised,
+    discretise,
+    solve_fixed_endpoint,
     state_dependent,
-    steer,
 )
 from formation_gnc.orbit.elements import Elements
 from formation_gnc.relative.chief import KeplerChief, OblateChief
@@ -47,36 +47,36 @@ def stacked(phi, gamma):
     return np.vstack(free), np.vstack(forced)
 
 
-def test_without_a_weight_on_the_way_it_is_the_least_norm_that_arrives():
+def test_without_a_state_weight_it_is_the_minimum_norm_solution():
     phi, gamma = varying(12)
     free, forced = stacked(phi, gamma)
     expected = np.linalg.lstsq(forced[-6:] / UNIT[:, None], (GOAL - free[-6:] @ START) / UNIT, rcond=None)[0]
-    found = steer(phi, gamma, START, GOAL, Cost(NOTHING, np.eye(3), NOTHING))
+    found = solve_fixed_endpoint(phi, gamma, START, GOAL, Cost(NOTHING, np.eye(3), NOTHING))
     np.testing.assert_allclose(found.inputs.ravel(), expected, rtol=0, atol=1e-9 * np.abs(expected).max())
     np.testing.assert_allclose(found.states[-1] / UNIT, GOAL / UNIT, rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("share", [0.0, 1.0])
-def test_with_weights_it_solves_the_conditions_of_optimality(share):
-    """All at once, as equations in inputs and multipliers; with a soft end for share 1."""
+def test_with_weights_it_satisfies_the_kkt_conditions(share):
+    """KKT system in all inputs and multipliers at once; soft terminal constraint for share 1."""
     phi, gamma = varying(12)
     free, forced = stacked(phi, gamma)
     q, r = np.diag(UNIT**-2.0), np.diag([1e11, 2e11, 3e11])
     slack = share * np.diag((100.0 * UNIT) ** 2)
-    # the state before a step counts: those after steps 1 to N - 1, the start being given
+    # The cost has the state before each step: after steps 1 to N - 1, since the start is given.
     weight = block_diag(*[q] * 11, NOTHING)
     hessian = forced.T @ weight @ forced + block_diag(*[r] * 12)
     end = forced[-6:] / UNIT[:, None]
     left = np.block([[hessian, end.T], [end, -slack / np.outer(UNIT, UNIT)]])
     right = np.concatenate([-forced.T @ weight @ free @ START, (GOAL - free[-6:] @ START) / UNIT])
     expected = np.linalg.solve(left, right)[:36]
-    found = steer(phi, gamma, START, GOAL, Cost(q, r, slack))
+    found = solve_fixed_endpoint(phi, gamma, START, GOAL, Cost(q, r, slack))
     np.testing.assert_allclose(found.inputs.ravel(), expected, rtol=0, atol=1e-7 * np.abs(expected).max())
     missed = np.linalg.norm((found.states[-1] - GOAL)[:3])
     assert missed < 1e-6 if share == 0.0 else missed > 1.0
 
 
-def test_in_short_steps_it_is_the_transition_matrix_of_the_hamiltonian():
+def test_short_steps_converge_to_the_hamiltonian_transition_matrix():
     """Joshi (5.13)-(5.16), with the sign of (5.11) corrected and a weight on the state."""
     model, q, r = HillModel(6.3e-4), np.diag((1000.0 * UNIT) ** -2.0), 1e5
     dynamics = model.dynamics(0.0)
@@ -89,20 +89,22 @@ def test_in_short_steps_it_is_the_transition_matrix_of_the_hamiltonian():
     for n in (500, 1000):
         step = DURATION / n
         phi, gamma = (np.broadcast_to(each, (n, *each.shape)) for each in model.discretise(0.0, step))
-        found = steer(phi, gamma, START, GOAL, Cost(q * step, r * np.eye(3) * step, NOTHING))
+        found = solve_fixed_endpoint(phi, gamma, START, GOAL, Cost(q * step, r * np.eye(3) * step, NOTHING))
         errors.append(np.linalg.norm(found.inputs[0] + costate[3:] / r))
-    # the first input is the mean over a step, of a function that changes: half the error in half the step
+    # The first input is the mean over the step: first order in its length.
     assert errors[0] < 0.02 * np.linalg.norm(costate[3:] / r)
     assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.05)
 
 
-def test_what_the_input_cannot_reach_is_rejected():
+def test_an_unreachable_goal_is_rejected():
     phi, gamma = varying(12)
     cost = Cost(NOTHING, np.eye(3), NOTHING)
     with pytest.raises(LinAlgError, match="singular"):
-        steer(phi[:1], gamma[:1], START, GOAL, cost)  # six states from three forces
-    with pytest.raises(LinAlgError, match="out of the input's reach"):
-        steer(phi, gamma[..., :2], START, GOAL, Cost(NOTHING, np.eye(2), NOTHING))  # no thrust across
+        solve_fixed_endpoint(phi[:1], gamma[:1], START, GOAL, cost)  # six states from three forces
+    with pytest.raises(LinAlgError, match="not reachable"):
+        solve_fixed_endpoint(
+            phi, gamma[..., :2], START, GOAL, Cost(NOTHING, np.eye(2), NOTHING)
+        )  # no cross-track thrust
 
 
 @pytest.mark.parametrize("steps", [20, 40])
@@ -112,7 +114,7 @@ def test_discretisation_is_of_order_four(steps):
     for count in (steps, 2 * steps):
         half = np.linspace(0.0, DURATION, 2 * count + 1)
         a = np.array([model.dynamics(time) for time in half])
-        phi, gamma = discretised(a, np.broadcast_to(INPUT, (len(a), 6, 3)), DURATION / count)
+        phi, gamma = discretise(a, np.broadcast_to(INPUT, (len(a), 6, 3)), DURATION / count)
         exact = model.discretise(0.0, DURATION)
         whole, pushed = np.eye(6), np.zeros((6, 3))
         for k in range(count):
@@ -134,8 +136,8 @@ MODELS = {
 
 @pytest.mark.parametrize("name", MODELS)
 @pytest.mark.parametrize("size", [0.0, 1.0, 20.0])
-def test_a_sequence_that_converges_solves_the_nonlinear_equations(name, size):
-    """From the chief itself too, where a factorisation could divide by zero."""
+def test_a_converged_sequence_solves_the_nonlinear_equations(name, size):
+    """Also from the chief itself, where a factorisation may divide by zero."""
     model, steps = MODELS[name], 40
     start, goal = size * START, max(size, 1.0) * GOAL
     guess = start + np.linspace(0.0, 1.0, steps + 1)[:, None] * (goal - start)
@@ -147,13 +149,13 @@ def test_a_sequence_that_converges_solves_the_nonlinear_equations(name, size):
     assert len(found.changes) <= 6
     assert np.all(np.diff(found.changes) < 0.0)
     state, step = start, DURATION / steps
-    for k, acceleration in enumerate(found.steering.inputs):
+    for k, acceleration in enumerate(found.trajectory.inputs):
         state = model.propagate(k * step, state, step, acceleration)
-    # Order four in 50 s: 10^-7 of the way
+    # RK4 at 50 s: 1e-7 of the distance.
     assert np.linalg.norm((state - goal)[:3]) < 2e-7 * np.linalg.norm(goal[:3])
 
 
-def test_a_sequence_that_is_cut_short_says_so():
+def test_a_sequence_that_is_cut_short_has_not_converged():
     system = state_dependent(MODELS["with J2"], "sdc1", np.linspace(0.0, DURATION, 21))
     guess = START + np.linspace(0.0, 1.0, 11)[:, None] * (GOAL - START)
     found = approximating_sequence(system, guess, GOAL, DURATION, Cost(NOTHING, np.eye(3), NOTHING), UNIT, 1e-9, 2)

@@ -8,18 +8,18 @@ from hypothesis import strategies as st
 from formation_gnc.common import CommonParameters, Orbit
 from formation_gnc.control.controller import Handover, Vehicle
 from formation_gnc.control.hinf import HInfinityController, HinfParameters
-from formation_gnc.control.mixed_sensitivity import Weight
+from formation_gnc.control.mixed_sensitivity import WeightingFunction
 from formation_gnc.errors import DesignError
 from formation_gnc.orbit.constants import MU
 from formation_gnc.relative.hill import HillModel
 
 MINUTE = 60.0
 GEO = CommonParameters(Orbit((MU / 7.2921e-5**2) ** (1.0 / 3.0)), tick=0.1 * MINUTE)
-MASS = 1000.0  # Neokleous prints none
+MASS = 1000.0  # kg; not given by Neokleous
 
 
 def neokleous(bandwidth=1.0, steady=0.03, time=0.05, effort=1.5, shift=0.1, **changes):
-    """His weights, in 1 / min and min^2, converted."""
+    """Weights of the thesis, converted from 1 / min and min^2."""
     return HinfParameters(
         bandwidth=(bandwidth / MINUTE,) * 3,
         steady_error=(steady,) * 3,
@@ -30,7 +30,7 @@ def neokleous(bandwidth=1.0, steady=0.03, time=0.05, effort=1.5, shift=0.1, **ch
     )
 
 
-def fly(law, start, ticks, estimate, target, limit=np.inf, push=0.0):
+def simulate(law, start, ticks, estimate, target, limit=np.inf, push=0.0):
     phi, gamma = HillModel(GEO.mean_motion).discretise(0.0, GEO.tick)
     states, forces = [np.asarray(start, dtype=float)], []
     for index in range(ticks):
@@ -47,30 +47,30 @@ def vehicle(limit):
 def test_neokleous_comparison_scenario(estimate, target):
     # 6.2: 100 m off in every axis, 100 N, within 10 cm after 100 minutes.
     law = HInfinityController(neokleous(), GEO, vehicle(100.0))
-    states, forces = fly(law, [100.0, 100.0, 100.0, 0.0, 0.0, 0.0], 1500, estimate, target)
+    states, forces = simulate(law, [100.0, 100.0, 100.0, 0.0, 0.0, 0.0], 1500, estimate, target)
     assert np.abs(states[1000:, :3]).max() < 0.1
     assert np.abs(forces).max() < 100.0
-    assert 2.0 < law.best_gamma < 2.5  # and not below 1: the printed weights cannot all be met
+    assert 2.0 < law.optimal_gamma < 2.5  # and not below 1: the printed weights cannot all be met
 
 
 @pytest.mark.parametrize(
     "parameters",
     [neokleous(shift=0.0, disturbance=1e-5), neokleous(10.0, 0.003, 0.1, shift=0.0, disturbance=1e-5)],
 )
-def test_every_channel_keeps_its_bound_at_every_frequency(parameters):
+def test_every_channel_satisfies_its_bound_at_every_frequency(parameters):
     law = HInfinityController(parameters, GEO, vehicle(1.0))
     frequency = np.logspace(-7, 2, 400)
     values = law.problem.singular_values(law.continuous, frequency)
     performance, uncertainty = law.problem.performance.at(frequency), law.problem.uncertainty.at(frequency)
-    # All channels are alike, so the largest singular value of a product is the product.
+    # The channels are alike, so that the largest singular value of a product is the product.
     assert (values["S"].max(axis=1) * performance[:, 0]).max() <= law.gamma
     assert (values["T"].max(axis=1) * uncertainty[:, 0]).max() <= law.gamma
     assert (values["KS"].max(axis=1) * law.problem.effort[0]).max() <= law.gamma
-    # Below the best gamma no controller keeps them all: one is close to it.
-    assert (values["S"].max(axis=1) * performance[:, 0]).max() > 0.5 * law.best_gamma
+    # Below the optimal gamma no controller satisfies all bounds: one of them is nearly attained.
+    assert (values["S"].max(axis=1) * performance[:, 0]).max() > 0.5 * law.optimal_gamma
 
 
-def test_the_best_gamma_is_that_of_python_control():
+def test_the_optimal_gamma_is_that_of_python_control():
     control = pytest.importorskip("control")
     problem = fresh("output").problem
     a, b2, c1, effort, disturbance = problem._scaled()
@@ -79,14 +79,14 @@ def test_the_best_gamma_is_that_of_python_control():
     d[:3, 3:6], d[6:9, 6:], d[9:, 3:6] = np.diag(problem.performance.direct), np.diag(effort), np.eye(3)
     plant = control.ss(a, b, np.vstack([c1, np.zeros((3, 12)), np.eye(3, 12)]), d)
     _, _, theirs, _ = control.hinfsyn(plant, 3, 3)
-    assert fresh("output").best_gamma == pytest.approx(theirs, rel=2e-3)  # to which ours is searched
+    assert fresh("output").optimal_gamma == pytest.approx(theirs, rel=2e-3)  # accuracy of the bisection
 
 
-def test_full_information_keeps_its_gamma_against_an_acceleration():
+def test_full_information_attains_its_gamma_for_an_acceleration():
     law = HInfinityController(neokleous(shift=0.0, disturbance=1e-5, form="full_information"), GEO, vehicle(1.0))
     b = np.vstack([np.zeros((3, 3)), np.eye(3)])
     loop, problem = law.continuous.closed_loop(law.problem.dynamics, b), law.problem
-    answer = np.hstack([law.continuous.d, law.continuous.c])
+    feedback = np.hstack([law.continuous.d, law.continuous.c])
     worst = 0.0
     for w in np.logspace(-7, 1, 300):
         state = np.linalg.solve(1j * w * np.eye(12) - loop, np.vstack([b, np.zeros((6, 3))]) * problem.disturbance)
@@ -96,19 +96,19 @@ def test_full_information_keeps_its_gamma_against_an_acceleration():
             [
                 (performance.direct + performance.residue / (1j * w + performance.pole))[:, None] * position,
                 (uncertainty.direct + uncertainty.residue / (1j * w + uncertainty.pole))[:, None] * position,
-                problem.effort[:, None] * (answer @ state),
+                problem.effort[:, None] * (feedback @ state),
             ]
         )
         worst = max(worst, np.linalg.norm(stacked, 2))
-    assert 0.5 * law.best_gamma < worst <= law.gamma
+    assert 0.5 * law.optimal_gamma < worst <= law.gamma
 
 
-def test_weights_have_the_limits_that_name_them():
+def test_weighting_functions_have_their_named_asymptotes():
     one = np.ones(3)
-    performance = Weight.performance(0.01 * one, 2.0 * one, 0.03 * one).at(np.array([1e-9, 0.01, 1e6]))[:, 0]
+    performance = WeightingFunction.performance(0.01 * one, 2.0 * one, 0.03 * one).at(np.array([1e-9, 0.01, 1e6]))[:, 0]
     np.testing.assert_allclose(performance[[0, 2]], [1.0 / 0.03, 0.5], rtol=1e-6)
     assert 1.0 < performance[1] < 1.2  # |w_P| is about 1 at the bandwidth
-    uncertainty = Weight.uncertainty(50.0 * one, 0.3 * one, 2.0 * one).at(np.array([1e-9, 1e6]))[:, 0]
+    uncertainty = WeightingFunction.uncertainty(50.0 * one, 0.3 * one, 2.0 * one).at(np.array([1e-9, 1e6]))[:, 0]
     np.testing.assert_allclose(uncertainty, [0.3, 2.0], rtol=1e-6)
 
 
@@ -129,12 +129,12 @@ def fresh(form, limit=1.0):
     velocity=st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3),
     force=st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3),
 )
-def test_taking_over_begins_with_the_force_that_flew(form, position, velocity, force, estimate, target):
+def test_activation_starts_at_the_force_commanded_before(form, position, velocity, force, estimate, target):
     law = LAWS[form]
     law._states = None
     law.activate(Handover(np.array(force), "lqr"))
     command = law.command(estimate([*position, *velocity], mass=MASS), target())
-    # Rounding of a sum whose terms may be 1e4 times larger.
+    # Rounding of a sum with terms up to 1e4 times larger.
     np.testing.assert_allclose(command.force, force, rtol=0.0, atol=1e-9)
 
 
@@ -142,27 +142,27 @@ def test_taking_over_begins_with_the_force_that_flew(form, position, velocity, f
 def test_a_large_offset_with_small_thrusters_does_not_wind_up(form, estimate, target):
     # Neokleous 6.2.3: 1 km, 1 N.
     start = [1000.0, 1000.0, 1000.0, 0.0, 0.0, 0.0]
-    states, forces = fly(fresh(form), start, 4000, estimate, target, limit=1.0)
+    states, forces = simulate(fresh(form), start, 4000, estimate, target, limit=1.0)
     assert (np.abs(forces) == 1.0).any(axis=0).all()
     assert np.abs(states[:, :3]).max() < 1200.0
     assert np.abs(states[-1, :3]).max() < 0.1
 
 
-def test_without_the_limit_in_mind_the_same_law_winds_up(estimate, target):
+def test_without_anti_windup_the_same_law_winds_up(estimate, target):
     start = [1000.0, 1000.0, 1000.0, 0.0, 0.0, 0.0]
     sharp = neokleous(shift=0.0, disturbance=3e-5)
     worst = {}
     for known in (1.0, np.inf):
         law = HInfinityController(sharp, GEO, vehicle(known))
-        states, _ = fly(law, start, 4000, estimate, target, limit=1.0)
+        states, _ = simulate(law, start, 4000, estimate, target, limit=1.0)
         worst[known] = np.abs(states[3000:, :3]).max()
     assert worst[1.0] < 1.0
     assert worst[np.inf] > 100.0
 
 
-def test_a_constant_push_leaves_what_the_weight_allows(estimate, target):
+def test_a_constant_disturbance_leaves_the_static_error_of_the_gain(estimate, target):
     law, push = fresh("output", limit=100.0), np.array([1e-5, -1e-5, 1e-5])
-    states, _ = fly(law, np.zeros(6), 3000, estimate, target, push=push)
+    states, _ = simulate(law, np.zeros(6), 3000, estimate, target, push=push)
     frequency = np.array([1e-9])
     static = HillModel(GEO.mean_motion).dynamics()
     k = law.continuous.c @ np.linalg.solve(-law.continuous.a, law.continuous.b)
@@ -179,8 +179,11 @@ def test_the_same_parameters_give_the_same_law():
     [
         ({"pole_shift": 0.0, "disturbance": 0.0}, "poles on the imaginary axis"),
         ({"thrust": (1e12,) * 3}, r"no controller at any gamma for these weights \(none up to gamma"),
-        ({"form": "full_information", "disturbance": 0.0}, "needs a disturbance"),
-        ({"bandwidth": (0.5, 0.5, 0.5), "thrust": (1e5, 1e5, 1e5)}, "once a tick is not stable"),
+        (
+            {"form": "full_information", "disturbance": 0.0},
+            "disturbance is 0; it must be above zero",
+        ),
+        ({"bandwidth": (0.5, 0.5, 0.5), "thrust": (1e5, 1e5, 1e5)}, "sampled closed loop is unstable"),
     ],
 )
 def test_inadmissible_parameters_are_rejected_with_the_reason(changes, message):

@@ -14,11 +14,11 @@ from formation_gnc.relative.chief import KeplerChief
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.tschauner_hempel import TschaunerHempelModel
 
-# Roberts' design point: 10 m recovered with 10 mN in about half an orbit.
+# Roberts' design point: recovery of 10 m with 10 mN in about half an orbit.
 ROBERTS = LqrParameters(position_error=(10.0,) * 3, velocity_error=(0.1,) * 3, thrust=(0.002,) * 3)
 
 
-def fly(law, model, estimate, target, start, ticks, tick=10.0, limit=0.01, disturbance=0.0, reference=None):
+def simulate(law, model, estimate, target, start, ticks, tick=10.0, limit=0.01, disturbance=0.0, reference=None):
     """Relative states (ticks + 1, 6) and forces (ticks, 3) of a closed loop on a linear model, 100 kg."""
     states, forces = [np.asarray(start, dtype=float)], []
     for index in range(ticks):
@@ -35,9 +35,9 @@ def fly(law, model, estimate, target, start, ticks, tick=10.0, limit=0.01, distu
 @pytest.mark.parametrize("model", ["hill", "schweighart_sedwick"])
 def test_an_offset_is_recovered_within_about_half_an_orbit(gain, model, common, vehicle, estimate, target):
     law = LinearQuadraticRegulator(dataclasses.replace(ROBERTS, gain=gain, model=model), common, vehicle)
-    states, forces = fly(law, HillModel(common.mean_motion), estimate, target, [10, 10, 10, 0, 0, 0], 400)
-    assert np.abs(forces).max() < 0.01  # Roberts' design point keeps within the thrusters
-    assert np.linalg.norm(states[290, :3]) < 1.73  # half an orbit is 290 ticks: a tenth is left
+    states, forces = simulate(law, HillModel(common.mean_motion), estimate, target, [10, 10, 10, 0, 0, 0], 400)
+    assert np.abs(forces).max() < 0.01  # Roberts' design point does not saturate
+    assert np.linalg.norm(states[290, :3]) < 1.73  # half an orbit, 290 ticks: a tenth is left
 
 
 @pytest.mark.parametrize("gain", ["frozen", "periodic"])
@@ -45,11 +45,11 @@ def test_gains_along_an_eccentric_orbit_stabilise_it(gain, vehicle, estimate, ta
     common = CommonParameters(Orbit(1.2e7, eccentricity=0.4), tick=10.0)
     law = LinearQuadraticRegulator(dataclasses.replace(ROBERTS, model="tschauner_hempel", gain=gain), common, vehicle)
     model = TschaunerHempelModel(KeplerChief(1.2e7, 0.4))
-    states, _ = fly(law, model, estimate, target, [10, 10, 10, 0, 0, 0], 1500)
+    states, _ = simulate(law, model, estimate, target, [10, 10, 10, 0, 0, 0], 1500)
     assert np.linalg.norm(states[-1, :3]) < 0.01
 
 
-def test_the_periodic_gain_has_no_jump_where_the_orbit_closes(vehicle):
+def test_the_periodic_gain_is_continuous_where_the_orbit_closes(vehicle):
     common = CommonParameters(Orbit(1.2e7, eccentricity=0.4), tick=10.0)
     law = LinearQuadraticRegulator(
         dataclasses.replace(ROBERTS, model="tschauner_hempel", gain="periodic"), common, vehicle
@@ -61,44 +61,44 @@ def test_the_periodic_gain_has_no_jump_where_the_orbit_closes(vehicle):
     np.testing.assert_allclose(at, later, rtol=0.0, atol=1e-9 * size.max())
 
 
-def test_the_finite_gain_arrives_on_time_and_then_holds(common, vehicle, estimate, target):
+def test_the_finite_gain_arrives_at_the_final_time_and_holds(common, vehicle, estimate, target):
     parameters = dataclasses.replace(ROBERTS, gain="finite", final_time=2000.0, terminal_weight=1e6)
     law = LinearQuadraticRegulator(parameters, common, vehicle)
-    states, _ = fly(law, HillModel(common.mean_motion), estimate, target, [10, 10, 10, 0, 0, 0], 400)
+    states, _ = simulate(law, HillModel(common.mean_motion), estimate, target, [10, 10, 10, 0, 0, 0], 400)
     infinite = LinearQuadraticRegulator(ROBERTS, common, vehicle)
-    others, _ = fly(infinite, HillModel(common.mean_motion), estimate, target, [10, 10, 10, 0, 0, 0], 400)
+    others, _ = simulate(infinite, HillModel(common.mean_motion), estimate, target, [10, 10, 10, 0, 0, 0], 400)
     assert np.linalg.norm(states[200, :3]) < 0.01
     assert np.linalg.norm(others[200, :3]) > 0.5
     assert np.linalg.norm(states[200:, :3], axis=1).max() < 0.02
 
 
-def test_the_integral_removes_what_a_constant_disturbance_leaves(common, vehicle, estimate, target):
+def test_the_integral_removes_the_offset_of_a_constant_disturbance(common, vehicle, estimate, target):
     model, push = HillModel(common.mean_motion), np.array([2e-6, -1e-6, 1e-6])
     plain = LinearQuadraticRegulator(ROBERTS, common, vehicle)
     integral = LinearQuadraticRegulator(dataclasses.replace(ROBERTS, integral_error=20_000.0), common, vehicle)
-    left, _ = fly(plain, model, estimate, target, np.zeros(6), 2000, disturbance=push)
-    gone, _ = fly(integral, model, estimate, target, np.zeros(6), 2000, disturbance=push)
+    left, _ = simulate(plain, model, estimate, target, np.zeros(6), 2000, disturbance=push)
+    gone, _ = simulate(integral, model, estimate, target, np.zeros(6), 2000, disturbance=push)
     assert np.linalg.norm(left[-1, :3]) > 0.1
-    assert np.linalg.norm(gone[-1, :3]) < 1e-2 * np.linalg.norm(left[-1, :3])  # and slowly falling
+    assert np.linalg.norm(gone[-1, :3]) < 1e-2 * np.linalg.norm(left[-1, :3])  # and still decreasing
 
 
-def test_an_axis_at_its_limit_does_not_wind_up(common, vehicle, estimate, target):
+def test_a_saturated_axis_does_not_wind_up(common, vehicle, estimate, target):
     parameters = dataclasses.replace(ROBERTS, integral_error=2_000.0)
     law = LinearQuadraticRegulator(parameters, common, vehicle)
-    start = [0, 0, 200, 0, 0, 0]  # far beyond what 10 mN can answer in proportion
-    states, forces = fly(law, HillModel(common.mean_motion), estimate, target, start, 3000)
+    start = [0, 0, 200, 0, 0, 0]  # far beyond the authority of 10 mN
+    states, forces = simulate(law, HillModel(common.mean_motion), estimate, target, start, 3000)
     assert (np.abs(forces[:50, 2]) == 0.01).all()
     assert np.abs(states[-1, :3]).max() < 0.1
-    unlimited = dataclasses.replace(vehicle, thrust_limit=np.full(3, np.inf))  # so it integrates throughout
+    unlimited = dataclasses.replace(vehicle, thrust_limit=np.full(3, np.inf))  # integrates throughout
     wound = LinearQuadraticRegulator(parameters, common, unlimited)
-    others, _ = fly(wound, HillModel(common.mean_motion), estimate, target, start, 3000)
+    others, _ = simulate(wound, HillModel(common.mean_motion), estimate, target, start, 3000)
     assert np.sum(np.abs(states[:, 2])) < 0.8 * np.sum(np.abs(others[:, 2]))
 
 
 def test_new_parameters_keep_the_integral(common, vehicle, estimate, target):
     parameters = dataclasses.replace(ROBERTS, integral_error=20_000.0)
     law, push = LinearQuadraticRegulator(parameters, common, vehicle), np.array([2e-6, 0.0, 0.0])
-    states, forces = fly(law, HillModel(common.mean_motion), estimate, target, np.zeros(6), 1500, disturbance=push)
+    states, forces = simulate(law, HillModel(common.mean_motion), estimate, target, np.zeros(6), 1500, disturbance=push)
     same = LinearQuadraticRegulator(parameters, common, vehicle)
     same.activate(Handover(forces[-1], "lqr", law))
     np.testing.assert_allclose(
@@ -109,7 +109,7 @@ def test_new_parameters_keep_the_integral(common, vehicle, estimate, target):
 
 
 def forced_circle(time, target, rate=0.003):
-    """A circle faster than free motion can be, with its preview."""
+    """Target on a circle faster than free motion, with its preview."""
 
     def state(moment):
         sine, cosine = np.sin(rate * moment), np.cos(rate * moment)
@@ -118,23 +118,23 @@ def forced_circle(time, target, rate=0.003):
     return target(state(time), time, np.array([state(time + 20.0)]), 20.0)
 
 
-def test_feed_forward_flies_a_target_that_needs_thrust(common, vehicle, estimate, target):
+def test_feed_forward_tracks_a_target_that_needs_thrust(common, vehicle, estimate, target):
     errors = {}
     for kind in ("none", "linear"):
         law = LinearQuadraticRegulator(dataclasses.replace(ROBERTS, feed_forward=kind), common, vehicle)
         start = forced_circle(0.0, target).relative_state
-        states, _ = fly(
+        states, _ = simulate(
             law, HillModel(common.mean_motion), estimate, target, start, 600,
             limit=1.0, reference=lambda time: forced_circle(time, target),
         )  # fmt: skip
         goal = np.array([forced_circle(10.0 * index, target).relative_state for index in range(601)])
         errors[kind] = np.linalg.norm((states - goal)[300:, :3], axis=1).max()
     assert errors["none"] > 20.0
-    # The mean over the preview step of 20 s is 10 s early, less half a tick of hold: 0.015 rad of the thrust.
+    # The mean over a preview step of 20 s leads by 10 s, less half a tick of hold: 0.015 rad of phase.
     assert errors["linear"] < 0.05 * errors["none"]
 
 
-def test_nonlinear_feed_forward_knows_j2_and_the_curvature(common, vehicle, estimate, target):
+def test_nonlinear_feed_forward_includes_j2_and_curvature(common, vehicle, estimate, target):
     chief = state_from_elements(Elements(**vars(common.chief)))
     rate = common.mean_motion
 
@@ -163,12 +163,12 @@ def test_nonlinear_feed_forward_knows_j2_and_the_curvature(common, vehicle, esti
     assert errors["nonlinear"] < 0.1 * errors["linear"]
 
 
-def test_feed_forward_without_a_preview_says_so(common, vehicle, estimate, target):
+def test_feed_forward_without_a_preview_is_reported(common, vehicle, estimate, target):
     law = LinearQuadraticRegulator(dataclasses.replace(ROBERTS, feed_forward="linear"), common, vehicle)
     assert "no preview" in law.command(estimate(np.zeros(6)), target()).fallback
 
 
-def test_matrices_in_place_of_bryson_weights(common, vehicle):
+def test_weight_matrices_equal_the_corresponding_bryson_weights(common, vehicle):
     bryson = LinearQuadraticRegulator(ROBERTS, common, vehicle)
     q = np.diag([0.01] * 3 + [100.0] * 3)
     matrices = LqrParameters(state_weight=tuple(q.ravel()), thrust_weight=tuple((np.eye(3) / 0.002**2).ravel()))

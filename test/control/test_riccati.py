@@ -21,13 +21,12 @@ HILL = HillModel(0.001083)
 Q, R = np.diag([1.0, 1.0, 1.0, 1e4, 1e4, 1e4]), 1e8 * np.eye(3)
 
 
-def test_neokleous_printed_eigenvalues():
-    # Time in minutes, as there; 0.1 min sampling. Printed for R = 100 I, they are those of R = I
-    # (seed_cases.md).
+def test_the_eigenvalues_are_those_printed_by_neokleous():
+    # In minutes, sampled every 0.1 min. Printed for R = 100 I, they belong to R = I.
     phi, gamma = HillModel(7.2921e-5 * 60.0).discretise(0.0, 0.1)
     gain = stationary_gain(phi, gamma, Weights.scaled(np.eye(6), np.eye(3), 0.1))
     ours = np.sort_complex(np.linalg.eigvals(phi - gamma @ gain))[1::2]
-    cut = np.floor(1e4 * np.column_stack([ours.real, ours.imag])) / 1e4  # the thesis cuts digits off, it does not round
+    cut = np.floor(1e4 * np.column_stack([ours.real, ours.imag])) / 1e4  # printed digits are truncated
     np.testing.assert_allclose(cut, [[0.9156, 0.0462], [0.9159, 0.0458], [0.9161, 0.0454]], rtol=1e-12)
 
 
@@ -46,12 +45,11 @@ def test_doubling_agrees_with_the_eigenvalue_method(position, velocity, thrust, 
     scaled_phi, scaled_gamma = weights.step(phi, gamma)
     theirs = solve_discrete_are(scaled_phi, scaled_gamma, weights.state, weights.input)
     ours = weights.map(phi, gamma).stabilising()
-    # The eigenvalue method is the less accurate of the two near the unit circle; both lose about half the
-    # digits there.
+    # Near the unit circle both lose about half the digits, the eigenvalue method more.
     np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=1e-6 * np.abs(theirs).max())
 
 
-def test_the_cost_to_go_is_the_cost_that_is_paid():
+def test_the_cost_to_go_is_the_cost_of_the_closed_loop():
     phi, gamma = HILL.discretise(0.0, 30.0)
     weights = Weights.scaled(Q, R, 30.0)
     cost_to_go = weights.map(phi, gamma).stabilising()
@@ -66,7 +64,7 @@ def test_the_cost_to_go_is_the_cost_that_is_paid():
     assert paid == pytest.approx(weights.cost_unit * scaled @ cost_to_go @ scaled, rel=1e-9)
 
 
-def test_many_steps_at_once_are_the_steps_one_by_one():
+def test_repeated_steps_equal_the_step_by_step_recursion():
     phi, gamma = HILL.discretise(0.0, 20.0)
     one = Weights.scaled(Q, R, 20.0).map(phi, gamma)
     cost_to_go = np.eye(6)
@@ -75,12 +73,12 @@ def test_many_steps_at_once_are_the_steps_one_by_one():
     np.testing.assert_allclose(one.repeated(37).backward(np.eye(6)), cost_to_go, rtol=1e-9, atol=1e-9)
 
 
-def test_continuous_gain_is_the_limit_of_short_ticks():
+def test_the_continuous_gain_is_the_limit_of_short_ticks():
     continuous = continuous_gain(HILL.dynamics(), HILL.INPUT, Weights.scaled(Q, R, 1.0))
     tick = 1e-3
     phi, gamma = HILL.discretise(0.0, tick)
     discrete = stationary_gain(phi, gamma, Weights.scaled(Q * tick, R * tick, tick))
-    # First order in the tick: its ratio to the loop's time constant of 100 s.
+    # First order in the tick over the time constant of 100 s.
     np.testing.assert_allclose(discrete, continuous, rtol=0.0, atol=1e-4 * np.abs(continuous).max())
 
 
@@ -90,7 +88,7 @@ def test_finite_gains_minimise_the_cost_over_all_thrust_histories():
     terminal = 100.0 * Q
     gains = finite_gains(phi, gamma, Weights.scaled(Q, R, tick), terminal, steps)
     start = np.array([10.0, -5.0, 3.0, 0.01, 0.02, -0.01])
-    # The same minimum by least squares over all 36 accelerations at once.
+    # Reference: least squares over all 36 accelerations.
     free, forced = np.empty((steps, 6)), np.zeros((steps, 6, 3 * steps))
     state, response = start, np.zeros((6, 3 * steps))
     for step in range(steps):
@@ -111,11 +109,11 @@ def test_finite_gains_minimise_the_cost_over_all_thrust_histories():
         state = phi @ state + gamma @ thrust
 
 
-def test_periodic_gains_are_those_of_the_recursion_tick_by_tick():
+def test_periodic_gains_equal_the_tick_by_tick_recursion():
     model = TschaunerHempelModel(KeplerChief(1.0e7, eccentricity=0.4))
     ticks, coarse = 2160, 180
     tick = model.period / ticks
-    weights = Weights.scaled(1e-4 * Q, R, tick)  # a loop as slow as the orbit, so that the whole orbit matters
+    weights = Weights.scaled(1e-4 * Q, R, tick)  # a loop as slow as the orbit
     every = [model.discretise(index * tick, tick) for index in range(ticks)]
     cost_to_go = np.eye(6)
     truth = np.empty((ticks, 3, 6))
@@ -127,9 +125,9 @@ def test_periodic_gains_are_those_of_the_recursion_tick_by_tick():
     middles = [model.discretise((index + 0.5) * repeats * tick, tick) for index in range(coarse)]
     gains = periodic_gains(middles, repeats, weights)
     size = np.abs(truth).max(axis=0)
-    # Stretches of 2 degrees: second order in their length, and half a tick of phase.
+    # Intervals of 2 degrees: second order in their length, and half a tick of phase.
     assert (np.abs(gains - truth[repeats // 2 :: repeats]) / size.max(axis=1, keepdims=True)).max() < 5e-3
-    assert (truth.max(axis=0) - truth.min(axis=0))[0, 0] > 0.5 * np.abs(truth[:, 0, 0]).min()  # and they do vary
+    assert (truth.max(axis=0) - truth.min(axis=0))[0, 0] > 0.5 * np.abs(truth[:, 0, 0]).min()  # the gains vary
 
 
 @pytest.mark.parametrize(
@@ -147,16 +145,16 @@ def test_inadmissible_weights_are_rejected_with_the_reason(state, thrust, messag
         Weights.scaled(state, thrust, 1.0)
 
 
-def test_what_no_thrust_can_stabilise_is_rejected():
+def test_an_unstabilisable_model_is_rejected():
     phi, gamma = HILL.discretise(0.0, 10.0)
-    gamma[:, 2] = 0.0  # nothing pushes across the track
+    gamma[:, 2] = 0.0  # no cross-track thrust
     with pytest.raises(DesignError, match="stabilising solution"):
         stationary_gain(phi, gamma, Weights.scaled(Q, R, 10.0))
 
 
-def test_a_map_before_nothing_is_itself():
+def test_the_map_of_no_steps_is_the_identity_of_composition():
     phi, gamma = HILL.discretise(0.0, 10.0)
     one = Weights.scaled(Q, R, 10.0).map(phi, gamma)
-    nothing = RiccatiMap(np.eye(6), np.zeros((6, 6)), np.zeros((6, 6)))
-    np.testing.assert_allclose(one.then(nothing).cost, one.cost, rtol=1e-14)
-    np.testing.assert_allclose(nothing.then(one).reach, one.reach, rtol=1e-14)
+    identity = RiccatiMap(np.eye(6), np.zeros((6, 6)), np.zeros((6, 6)))
+    np.testing.assert_allclose(one.then(identity).cost, one.cost, rtol=1e-14)
+    np.testing.assert_allclose(identity.then(one).gramian, one.gramian, rtol=1e-14)

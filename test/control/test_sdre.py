@@ -1,4 +1,4 @@
-"""The laws of the state-dependent Riccati equation: infinite and finite time, and its sequence."""
+"""SDRE over infinite and finite horizons, and ASRE."""
 
 import dataclasses
 
@@ -8,8 +8,8 @@ import pytest
 from formation_gnc.common import CommonParameters, Orbit
 from formation_gnc.control.asre import Asre, AsreParameters
 from formation_gnc.control.controller import Handover, Vehicle
-from formation_gnc.control.finite_horizon import Task
 from formation_gnc.control.lqr import LinearQuadraticRegulator, LqrParameters
+from formation_gnc.control.plan import Task
 from formation_gnc.control.sdre import Sdre, SdreParameters
 from formation_gnc.control.sdre_finite import FiniteSdre, SdreFiniteParameters
 from formation_gnc.errors import DesignError
@@ -25,8 +25,8 @@ CHIEF = Elements(1e7, 0.15, 1.0, 0.3, 0.2, 0.17)
 STRONG = Vehicle(100.0, np.full(3, 50.0))
 
 
-def fly(law, estimate, target, start, goal, ticks, tick=10.0, chief=CHIEF, disturbance=0.0):
-    """States (N + 1, 6) and commands on the truth of two orbits under J2."""
+def simulate(law, estimate, target, start, goal, ticks, tick=10.0, chief=CHIEF, disturbance=0.0):
+    """States (N + 1, 6) and commands, on two absolute orbits with J2."""
     leader = state_from_elements(chief)
     follower = inertial_from_relative(leader, start)
     states, commands = [start], []
@@ -41,7 +41,7 @@ def fly(law, estimate, target, start, goal, ticks, tick=10.0, chief=CHIEF, distu
     return np.array(states), commands
 
 
-def test_near_a_circular_chief_of_a_point_mass_it_is_lqr(common, vehicle, estimate, target):
+def test_near_a_circular_kepler_chief_sdre_is_lqr(common, vehicle, estimate, target):
     chief = state_from_elements(Elements(**vars(common.chief)))
     sdre = Sdre(SdreParameters(model="nonlinear", **WEIGHTS), common, vehicle)
     lqr = LinearQuadraticRegulator(LqrParameters(**WEIGHTS), common, vehicle)
@@ -51,7 +51,7 @@ def test_near_a_circular_chief_of_a_point_mass_it_is_lqr(common, vehicle, estima
 
 
 @pytest.mark.parametrize("factorisation", ["sdc1", "sdc2"])
-def test_a_gain_stabilises_the_matrix_it_is_made_for(factorisation):
+def test_the_gain_stabilises_the_matrix_of_its_design(factorisation):
     law = Sdre(SdreParameters(factorisation=factorisation, **WEIGHTS), CommonParameters(Orbit(1e7)), STRONG)
     model = NonlinearModel(KeplerChief.of(CHIEF))
     for time in np.linspace(0.0, model.period, 7):
@@ -61,8 +61,8 @@ def test_a_gain_stabilises_the_matrix_it_is_made_for(factorisation):
         assert np.linalg.eigvals(closed).real.max() < 0.0
 
 
-def test_sdre_takes_a_deputy_to_a_free_orbit_far_away_and_stays(estimate, target):
-    """50 km about an eccentric chief: the target moves as the truth does, and nothing is left to cancel."""
+def test_sdre_acquires_and_holds_a_distant_free_orbit(estimate, target):
+    """50 km about an eccentric chief, with a target in exact free motion."""
     goal_start = np.array([1.5e4, 4e4, 2e4, 5.0, -20.0, 3.0])
     leader = state_from_elements(CHIEF)
     deputy = inertial_from_relative(leader, goal_start)
@@ -72,7 +72,7 @@ def test_sdre_takes_a_deputy_to_a_free_orbit_far_away_and_stays(estimate, target
         leader, deputy = (advance_with_transition(each, np.zeros(3), 10.0, 1)[0] for each in (leader, deputy))
     weights = {"position_error": (100.0,) * 3, "velocity_error": (1.0,) * 3, "thrust": (2.0,) * 3}
     law = Sdre(SdreParameters(**weights), CommonParameters(Orbit(1e7, 0.15), tick=10.0), STRONG)
-    states, commands = fly(
+    states, commands = simulate(
         law,
         estimate,
         target,
@@ -84,13 +84,13 @@ def test_sdre_takes_a_deputy_to_a_free_orbit_far_away_and_stays(estimate, target
     assert np.linalg.norm((states[-1] - goals[-1])[:3]) < 0.1  # of 3.7 km
 
 
-def test_the_integral_removes_a_constant_force(estimate, target):
+def test_the_integral_removes_the_offset_of_a_constant_force(estimate, target):
     common = CommonParameters(Orbit(1e7, 0.0), tick=10.0)
     chief = dataclasses.replace(CHIEF, eccentricity=0.0)
     left = {}
     for integral in (0.0, 2e4):
         law = Sdre(SdreParameters(integral_error=integral, **WEIGHTS), common, STRONG)
-        states, _ = fly(law, estimate, target, np.zeros(6), np.zeros(6), 1500, chief=chief, disturbance=1e-3)
+        states, _ = simulate(law, estimate, target, np.zeros(6), np.zeros(6), 1500, chief=chief, disturbance=1e-3)
         left[integral] = np.linalg.norm(states[-1, :3])
     assert left[0.0] > 1.0
     assert left[2e4] < 0.05 * left[0.0]
@@ -107,27 +107,27 @@ def test_a_change_of_parameters_keeps_the_integral(common, vehicle, estimate, ta
     np.testing.assert_allclose(other.command(seen, aim).force, law.command(seen, aim).force, rtol=1e-6)
 
 
-def test_a_gain_that_does_not_exist_is_named_and_lqr_flies(common, vehicle, estimate, target):
+def test_a_missing_gain_is_reported_and_lqr_is_active(common, vehicle, estimate, target):
     law = Sdre(SdreParameters(**WEIGHTS), common, vehicle)
     state = np.array([5.0, -8.0, 3.0, 0.0, 0.0, 0.0])
     for chief, words in ((np.zeros(6), "no gain"), (np.full(6, np.nan), "no gain")):
         command = law.command(estimate(state, chief=chief), target())
         assert words in command.fallback
-        np.testing.assert_array_equal(command.force, law.reserve.command(estimate(state), target()).force)
-    # so far away that the matrices overflow
+        np.testing.assert_array_equal(command.force, law.fallback_law.command(estimate(state), target()).force)
+    # So far away that the matrices overflow.
     chief = state_from_elements(Elements(**vars(common.chief)))
     with np.errstate(all="ignore"):
-        assert "LQR flies" in law.command(estimate(1e160 * state, 10.0, chief=chief), target(time=10.0)).fallback
+        assert "LQR active" in law.command(estimate(1e160 * state, 10.0, chief=chief), target(time=10.0)).fallback
 
 
-def test_weights_that_are_none_are_rejected(common, vehicle):
+def test_inadmissible_weights_are_rejected(common, vehicle):
     with pytest.raises(DesignError, match="sdre: state_weight has 2 values"):
         Sdre(SdreParameters(state_weight=(1.0, 2.0)), common, vehicle)
 
 
 @pytest.mark.parametrize(("law", "parameters"), [(FiniteSdre, SdreFiniteParameters), (Asre, AsreParameters)])
-def test_a_reconfiguration_arrives_in_time_and_is_held(law, parameters, estimate, target):
-    """5 km about an eccentric chief under J2, from within a kilometre to within metres."""
+def test_a_reconfiguration_arrives_on_time_and_is_held(law, parameters, estimate, target):
+    """From within 1 km to 8 km about an eccentric chief with J2."""
     common = CommonParameters(Orbit(1e7, 0.15), tick=10.0)
     start = np.array([353.0, 707.0, 353.0, 0.22, -0.44, 0.22])
     leader = state_from_elements(CHIEF)
@@ -136,18 +136,18 @@ def test_a_reconfiguration_arrives_in_time_and_is_held(law, parameters, estimate
     for _ in range(251):
         goals.append(relative_from_inertial(leader, deputy))
         leader, deputy = (advance_with_transition(each, np.zeros(3), 10.0, 1)[0] for each in (leader, deputy))
-    flying = law(parameters(final_time=2000.0, last_plan=60.0, replan_interval=60.0, **WEIGHTS), common, STRONG)
-    states, commands = fly(flying, estimate, target, start, lambda time: goals[round(time / 10.0)], 250)
+    controller = law(parameters(final_time=2000.0, last_plan=60.0, replan_interval=60.0, **WEIGHTS), common, STRONG)
+    states, commands = simulate(controller, estimate, target, start, lambda time: goals[round(time / 10.0)], 250)
     assert not any(command.fallback for command in commands)
     assert [command.solver for command in commands[199:202]] == ["following", "holding", "holding"]
     off = np.linalg.norm((states - goals)[:, :3], axis=1)
     assert off[0] > 5000.0
-    # SDRE's last plan, 80 s before the end, still has its matrices frozen: (n t)^3 of what changes
+    # The last plan of SDRE, 80 s before the end, has frozen matrices: an error of (n t)^3.
     assert off[200] < (0.1 if law is Asre else 2.0)
     assert off[-1] < 2.0
 
 
-def test_a_design_tells_its_gain_and_its_schedule(common, vehicle):
+def test_the_design_figures_have_the_gain_and_the_schedule(common, vehicle):
     sdre = Sdre(SdreParameters(model="nonlinear", **WEIGHTS), common, vehicle).figures()
     lqr = LinearQuadraticRegulator(LqrParameters(**WEIGHTS), common, vehicle).figures()
     (gain,) = sdre.values()
@@ -170,22 +170,22 @@ def test_a_plan_is_a_pure_function_of_its_task(common):
         np.testing.assert_array_equal(first.acceleration, second.acceleration)
 
 
-def test_a_sequence_that_does_not_converge_is_named(common, vehicle, estimate, target):
-    law = Asre(AsreParameters(most_iterations=1, **WEIGHTS), common, vehicle)
+def test_a_sequence_that_does_not_converge_is_reported(common, vehicle, estimate, target):
+    law = Asre(AsreParameters(max_iterations=1, **WEIGHTS), common, vehicle)
     chief = state_from_elements(Elements(**vars(common.chief)))
     command = law.command(estimate([20.0, 0, 0, 0, 0, 0], chief=chief), target())
     assert command.fallback.startswith("no plan: not converged in 1 iterations")
 
 
 @pytest.mark.parametrize("law", [FiniteSdre, Asre])
-def test_an_axis_without_thrust_gets_none(law, common, estimate, target):
-    """Without the radial one all can be reached; not so without one that changes the energy, or the third."""
+def test_only_the_radial_axis_is_dispensable(law, common, estimate, target):
+    """Every state is reachable without radial thrust, but not without along-track or cross-track thrust."""
     chief = state_from_elements(Elements(**vars(common.chief)))
     for idle, words in ((0, ""), (1, "no plan"), (2, "no plan")):
         limit = np.full(3, 0.05)
         limit[idle] = 0.0
-        flying = law(law.Parameters(**WEIGHTS), common, Vehicle(100.0, limit))
-        command = flying.command(estimate([2.0, 5.0, 5.0, 0, 0, 0], chief=chief), target())
+        controller = law(law.Parameters(**WEIGHTS), common, Vehicle(100.0, limit))
+        command = controller.command(estimate([2.0, 5.0, 5.0, 0, 0, 0], chief=chief), target())
         if words:
             assert words in command.fallback
         else:
@@ -194,15 +194,15 @@ def test_an_axis_without_thrust_gets_none(law, common, estimate, target):
             assert command.force.any()
 
 
-def test_one_step_is_no_plan_and_says_so(common, vehicle, estimate, target):
+def test_a_single_step_is_reported_as_singular(common, vehicle, estimate, target):
     law = FiniteSdre(SdreFiniteParameters(final_time=20.0, **WEIGHTS), common, vehicle)
     chief = state_from_elements(Elements(**vars(common.chief)))
     command = law.command(estimate([20.0, 0, 0, 0, 0, 0], chief=chief), target())
     assert "singular" in command.fallback
 
 
-def test_a_free_orbit_is_followed_with_next_to_no_thrust(estimate, target):
-    """About a circular chief of a point mass Hill's ellipse is nearly free: no more is asked."""
+def test_hill_ellipse_about_a_kepler_chief_needs_no_thrust(estimate, target):
+    """On the target the command is zero: feedback and factorisation terms both vanish."""
     common = CommonParameters(Orbit(6978100.0), tick=10.0)
     orbit = RelativeOrbit(RelativeOrbitParameters(rho=100.0, m=1.0), common.mean_motion)
     law = Sdre(SdreParameters(model="nonlinear", **WEIGHTS), common, Vehicle(100.0, np.full(3, 0.01)))

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from formation_gnc.control.finite_horizon import Task
+from formation_gnc.control.plan import Task
 from formation_gnc.control.static_programming import advance, gmpsp, mpsp
 from formation_gnc.relative.chief import KeplerChief
 from formation_gnc.relative.hill import HillModel
@@ -23,7 +23,7 @@ def task(steps, **changes):
 
 
 def effort(plan):
-    """Integral of the square of the acceleration, by the rule that belongs to the history."""
+    """Integral of the squared acceleration, by the quadrature of the method."""
     squares = (plan.history**2).sum(axis=1)
     if len(plan.history) == len(plan.acceleration):
         return squares.sum() * plan.duration / len(squares)
@@ -33,21 +33,21 @@ def effort(plan):
 
 @pytest.mark.parametrize("method", [mpsp, gmpsp])
 @pytest.mark.parametrize("model", [NonlinearModel(CHIEF), OblateModel(CHIEF)], ids=["point mass", "J2"])
-def test_the_plan_flown_by_another_integrator_arrives(method, model):
+def test_the_plan_reaches_the_goal_under_another_integrator(method, model):
     plan = method(task(100, model=model), TOLERANCE)
     assert not plan.failure
-    assert plan.iterations == 2  # quadratic: 10 km, then metres, then nanometres
+    assert plan.iterations == 2  # quadratic convergence: 10 km, metres, nanometres
     state, step = START, plan.duration / len(plan.acceleration)
     for k, acceleration in enumerate(plan.acceleration):
         state = model.propagate(k * step, state, step, acceleration)
-    # MPSP: RK4 at 20 s. G-MPSP: a smooth history held over half steps, which moves the deputy by
-    # step^2 / 12 times what the acceleration changes by, per axis.
+    # MPSP: RK4 at 20 s. G-MPSP: a smooth history held over half steps, step^2 / 12 times the change of the
+    # acceleration per axis.
     bound = 1e-3 if method is mpsp else step**2 / 6.0 * np.ptp(plan.history, axis=0).max()
     assert (np.abs(state - GOAL) < np.repeat([bound, 2e-3 * bound], 3)).all()
 
 
-def test_on_a_linear_model_one_round_is_the_minimum_energy_transfer():
-    """In closed form: u = B' Phi(tf, t)' G^-1 (x_f - Phi x_0), with G the controllability Gramian."""
+def test_one_iteration_on_a_linear_model_is_the_minimum_energy_plan():
+    """Closed form: u = B' Phi(tf, t)' G^-1 (x_f - Phi x_0), with G the controllability Gramian."""
     model = HillModel(1e-3)
     plan = mpsp(task(400, model=model), TOLERANCE)
     assert plan.iterations == 1
@@ -61,7 +61,7 @@ def test_on_a_linear_model_one_round_is_the_minimum_energy_transfer():
 
 
 @pytest.mark.parametrize("order", [("euler", 1), ("rk4", 4)])
-def test_the_step_is_of_its_order_and_its_sensitivities_are_its_derivatives(order):
+def test_the_integration_step_has_its_order_and_exact_sensitivities(order):
     method, expected = order
     model, thrust = OblateModel(CHIEF), np.array([1e-3, -2e-3, 1e-3])
     exact = model.propagate(0.0, GOAL, 40.0, thrust)
@@ -84,16 +84,16 @@ def test_the_step_is_of_its_order_and_its_sensitivities_are_its_derivatives(orde
         np.testing.assert_allclose(slopes[:, column], slope, rtol=0.0, atol=1e-6 * np.abs(slope).max())
 
 
-def test_the_two_forms_tend_to_one_optimum_as_the_steps_shrink():
-    """Holding thrust costs; the cost falls with the square of the step towards the continuous one."""
+def test_both_methods_converge_to_one_optimum_as_steps_shrink():
+    """The excess cost of held thrust is of second order in the step."""
     continuous = effort(gmpsp(task(200), TOLERANCE))
     excess = [effort(mpsp(task(steps), TOLERANCE)) / continuous - 1.0 for steps in (25, 50)]
     assert 0.0 < excess[1] < excess[0] < 2e-3
     assert excess[0] / excess[1] == pytest.approx(4.0, rel=0.05)
 
 
-def test_no_neighbour_that_arrives_costs_less():
-    """First-order optimality: moving a converged history within the null space of its sensitivities."""
+def test_a_converged_history_is_stationary():
+    """First-order optimality: no component in the null space of the sensitivities."""
     plan = mpsp(task(50), TOLERANCE)
     state, slopes = START, []
     for k in range(50):
@@ -109,7 +109,7 @@ def test_no_neighbour_that_arrives_costs_less():
     assert np.linalg.norm(within) < 1e-8 * np.linalg.norm(flat)  # the history lies in the range of B'
 
 
-def test_an_axis_without_thrust_gets_none_and_the_others_do_its_work():
+def test_an_axis_without_thrust_is_replaced_by_the_others():
     plan = mpsp(task(50, effort=np.diag([np.inf, 1.0, 1.0])), TOLERANCE)
     assert not plan.failure
     assert not plan.acceleration[:, 0].any()
@@ -127,14 +127,14 @@ def test_slack_trades_the_terminal_error_against_effort(method):
 
     assert np.linalg.norm(soft.errors[-1][:3]) > 1.0
     assert cost(soft) < cost(hard)
-    softer = method(task(50, slack=1.01 * np.diag(slack)), TOLERANCE)  # a neighbour, judged by the same cost
+    softer = method(task(50, slack=1.01 * np.diag(slack)), TOLERANCE)  # a perturbed solution under the same cost
     assert cost(soft) < cost(softer)
 
 
 @pytest.mark.parametrize(
     ("changes", "steps", "reason"),
     [
-        ({"effort": np.diag([1.0, 1.0, np.inf])}, 50, "singular"),  # nothing pushes across the track
+        ({"effort": np.diag([1.0, 1.0, np.inf])}, 50, "singular"),  # no cross-track thrust
         ({"duration": 0.0}, 50, "past by 0 s"),
         ({"duration": -20.0}, 50, "past by 20 s"),
         ({"state": np.array([np.nan, 0, 0, 0, 0, 0])}, 50, "not finite"),
@@ -143,18 +143,18 @@ def test_slack_trades_the_terminal_error_against_effort(method):
     ],
 )
 @pytest.mark.parametrize("method", [mpsp, gmpsp])
-def test_what_gives_no_plan_is_named(method, changes, steps, reason):
+def test_an_infeasible_task_is_reported(method, changes, steps, reason):
     plan = method(task(steps, **changes), TOLERANCE)
     assert reason in plan.failure
 
 
-def test_three_numbers_do_not_meet_six_conditions():
+def test_one_step_cannot_meet_six_terminal_conditions():
     assert "singular" in mpsp(task(1), TOLERANCE).failure
     assert not mpsp(task(2), TOLERANCE).failure
 
 
 @pytest.mark.parametrize("method", [mpsp, gmpsp])
-def test_rounds_that_do_not_end_are_ended(method):
+def test_the_number_of_iterations_is_bounded(method):
     assert "1 iterations leave" in method(task(50), TOLERANCE, 1).failure
     assert "5 iterations leave" in method(task(50), np.zeros(6), 5).failure
 
@@ -167,10 +167,10 @@ def test_rounds_that_do_not_end_are_ended(method):
     st.integers(1, 20),
     st.sampled_from([mpsp, gmpsp]),
 )
-def test_a_plan_either_arrives_or_says_why_not(state, goal, duration, steps, method):
+def test_a_plan_reaches_the_goal_or_reports_a_failure(state, goal, duration, steps, method):
     scale = np.repeat([1.0, 1e-3], 3)
-    asked = task(steps, state=np.array(state) * scale, goal=np.array(goal) * scale, duration=duration)
-    plan = method(asked, TOLERANCE)
+    problem = task(steps, state=np.array(state) * scale, goal=np.array(goal) * scale, duration=duration)
+    plan = method(problem, TOLERANCE)
     if not plan.failure:
         assert np.isfinite(plan.acceleration).all()
         assert (np.abs(plan.errors[-1]) <= TOLERANCE).all()

@@ -11,8 +11,8 @@ from scipy.linalg import expm
 from formation_gnc.common import CommonParameters
 from formation_gnc.common import Orbit as Chief
 from formation_gnc.control.controller import Vehicle
-from formation_gnc.control.finite_horizon import Task
 from formation_gnc.control.fixed_endpoint_lq import state_dependent
+from formation_gnc.control.plan import Task
 from formation_gnc.control.riccati import Weights, continuous_gain
 from formation_gnc.control.sdre import Sdre, SdreParameters
 from formation_gnc.control.sdre_finite import FiniteSdre, SdreFiniteParameters

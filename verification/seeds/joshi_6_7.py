@@ -9,8 +9,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
-from formation_gnc.control.finite_horizon import PLAN_MODELS, Task
-from formation_gnc.control.static_programming import StaticPlan, gmpsp, mpsp, regulated
+from formation_gnc.control.finite_horizon import PLAN_MODELS
+from formation_gnc.control.plan import Task
+from formation_gnc.control.static_programming import StaticPlan, gmpsp, lqr_guess, mpsp
 from formation_gnc.orbit.elements import Elements
 from formation_gnc.relative.chief import KeplerChief, frame_matrix
 from formation_gnc.relative.model import ON_THE_CHIEF, RelativeModel
@@ -73,7 +74,7 @@ def task_of(plant: RelativeModel, start: Orbit, goal: Orbit) -> Task:
 
 def with_guess(task: Task) -> Task:
     """And LQR's history as its guess."""
-    return replace(task, guess=regulated(task, HILL, GAIN))
+    return replace(task, guess=lqr_guess(task, HILL, GAIN))
 
 
 def distance(error: Array) -> float:

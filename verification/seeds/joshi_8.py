@@ -7,7 +7,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from formation_gnc.control.networks import Networks, Regulator, functions
+from formation_gnc.control.networks import Networks, Regulator, basis_functions
 from formation_gnc.control.riccati import Weights, continuous_cost_to_go
 from formation_gnc.relative.chief import KeplerChief
 from formation_gnc.relative.hill import HillModel
@@ -70,17 +70,17 @@ class Learner:
         """Acceleration, m/s^2."""
         networks, error = self.networks, (state - GOAL.state(time)) / UNIT
         if self.learns:
-            values, slopes = functions(state / UNIT, SEMI_MAJOR_AXIS / REACH, latitude(time))
+            basis, gradients = basis_functions(state / UNIT, SEMI_MAJOR_AXIS / REACH, latitude(time))
             if time == 0.0:
-                networks.meet(error)
-            networks.identify(error, values, slopes, TICK * PACE)
+                networks.reset_observer(error)
+            networks.identify(error, basis, gradients, TICK * PACE)
         thrust = networks.thrust(error)
         self.costates.append(networks.costate_weights)
         if self.learns:
-            following = networks.fly(error, values, thrust, TICK * PACE)
-            networks.teach(error, following, slopes, TICK * PACE)
+            following = networks.predict(error, basis, thrust, TICK * PACE)
+            networks.train(error, following, gradients, TICK * PACE)
             self.missing.append((self.truth.derivative(time, state) - HILL.derivative(time, state))[3:])
-            self.identified.append(INPUT_UNIT * (values @ networks.model_weights))
+            self.identified.append(INPUT_UNIT * (basis @ networks.model_weights))
             self.weights.append(networks.model_weights)
         return np.asarray(INPUT_UNIT * thrust)
 
@@ -94,8 +94,8 @@ class ApproximatePlant(HillModel):
     def derivative(self, time: float, state: Array, acceleration: Array = NO_THRUST) -> Array:
         """(6,) rate of change of a relative state (6,)."""
         rate = super().derivative(time, state, acceleration)
-        values, _ = functions(state / UNIT, SEMI_MAJOR_AXIS / REACH, latitude(time))
-        rate[3:] += INPUT_UNIT * (values @ self.weights[min(int(time), FINAL - 1)])
+        basis, _ = basis_functions(state / UNIT, SEMI_MAJOR_AXIS / REACH, latitude(time))
+        rate[3:] += INPUT_UNIT * (basis @ self.weights[min(int(time), FINAL - 1)])
         return rate
 
 

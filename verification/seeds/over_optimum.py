@@ -64,19 +64,19 @@ def model_of(oblate: bool) -> str:
     return "oblate" if oblate else "nonlinear"
 
 
-def law_for(name: str, eccentricity: float, **own: Any) -> Controller:
+def law_for(name: str, eccentricity: float, **own: Any) -> Controller[Any]:
     """A law with parameters of its own, on a deputy without limits."""
     kind = ALGORITHMS[name]
     common = CommonParameters(Chief(SEMI_MAJOR_AXIS, eccentricity, INCLINATION), tick=TICK)
     return kind(kind.Parameters(**own), common, Vehicle(MASS, np.full(3, 1e9)))
 
 
-def planner(name: str, eccentricity: float, oblate: bool) -> Controller:
+def planner(name: str, eccentricity: float, oblate: bool) -> Controller[Any]:
     """A law with a final time."""
     return law_for(name, eccentricity, model=model_of(oblate), **SCHEDULE)
 
 
-def regulator(name: str, eccentricity: float, oblate: bool, rho: float) -> Controller:
+def regulator(name: str, eccentricity: float, oblate: bool, rho: float) -> Controller[Any]:
     """A law without one, that minimises the integral of |e|^2 / tau^4 + |u|^2."""
     place = tuple(np.diag([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]).ravel().tolist())
     own = {"sdre": {"model": model_of(oblate)}, "adaptive_lqr": {"reach": 2e3 * rho}}.get(name, {})
@@ -105,7 +105,7 @@ def goal_of(eccentricity: float, rho: float) -> Array:
 
 
 def fly_law(
-    law: Controller, eccentricity: float, oblate: bool, aim: Callable[[float], Target], duration: float
+    law: Controller[Any], eccentricity: float, oblate: bool, aim: Callable[[float], Target], duration: float
 ) -> tuple[Array, Array, list[Command]]:
     """States, accelerations and commands of a flight on the exact equations, each of which is to count."""
     chief, commands = chief_of(eccentricity), list[Command]()

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.linalg import LinAlgError
 from numpy.typing import NDArray
 
-from formation_gnc.control.fixed_endpoint_lq import Cost, Sequence, System, approximating_sequence
+from formation_gnc.control.fixed_endpoint_lq import AsreResult, Cost, System, approximating_sequence
 from verification.figure import Figure, save
 from verification.optimum import collocated
 from verification.seeds.accepted import Ours
@@ -98,7 +98,7 @@ def rate_of(state: Array, thrust: Array) -> Array:
     return np.array([radial_rate, rate, r * rate**2 - r**-2.0 + thrust[0], (thrust[1] - 2.0 * radial_rate * rate) / r])
 
 
-def asre(transfer: Transfer, fill: Callable[..., None], weight: float) -> Sequence:
+def asre(transfer: Transfer, fill: Callable[..., None], weight: float) -> AsreResult:
     """Q = weight I, R = I."""
     step = transfer.duration / STEPS
     cost = Cost(weight * step * np.eye(4), step * np.eye(2), np.zeros((4, 4)))
@@ -197,7 +197,7 @@ def section(directory: Path) -> tuple[str, list[Figure]]:
             words += ["diverges", "", ours(f"{case}: optimum", best, ".5g"), "", "", ""]
             lines.append(f"| {' | '.join(words)} |")
             continue
-        path, cost = flown(transfer, found.steering.inputs, weight)
+        path, cost = flown(transfer, found.trajectory.inputs, weight)
         miss = float(np.abs(path[-1] - transfer.goal).max())
         count = ours(f"{case}: iterations", len(found.changes), "d", margin=0.0)
         words += [
@@ -206,7 +206,7 @@ def section(directory: Path) -> tuple[str, list[Figure]]:
             ours(f"{case}: optimum", best, ".5g"),
             ours(f"{case}: J over the optimum", cost / best, ".3f"),
             ours(f"{case}: miss", miss, ".0e", margin=TOLERANCE),
-            ours(f"{case}: greatest thrust", float(np.abs(found.steering.inputs).max()), ".3g"),
+            ours(f"{case}: greatest thrust", float(np.abs(found.trajectory.inputs).max()), ".3g"),
         ]
         lines.append(f"| {' | '.join(words)} |")
         if not found.converged:
@@ -221,7 +221,7 @@ def section(directory: Path) -> tuple[str, list[Figure]]:
                 x, y = path[:, 0] * np.cos(path[:, 1]), path[:, 0] * np.sin(path[:, 1])
                 path_panel.plot(x, y, style, color=colors[name], label=label)
                 times = transfer.duration / STEPS * np.arange(STEPS)
-                for thrust, width in zip(found.steering.inputs.T, (2.5, 1.0), strict=True):
+                for thrust, width in zip(found.trajectory.inputs.T, (2.5, 1.0), strict=True):
                     thrust_panel.plot(times, thrust, style, color=colors[name], lw=width)
     for radius in (1.0, RADIUS):
         turn = np.linspace(0.0, 2.0 * pi, 200)
