@@ -60,7 +60,25 @@ class Row:
 
 NAVIGATION_STATE = Input(topics.ESTIMATE, NavigationState)
 
-GRAPH = (
+MODULES: dict[str, Row] = {}
+"""The table: rows by name, in the order in which they answer within a tick."""
+
+GRAPH = MODULES.values()
+"""Its rows."""
+
+
+def add_module(row: Row) -> None:
+    """Add a module to every satellite; it answers after those before it.
+
+    Raises:
+        ConfigurationError: a module of that name is there already.
+    """
+    if row.name in MODULES:
+        raise ConfigurationError(f"module {row.name}: is in the graph table already")
+    MODULES[row.name] = row
+
+
+for _row in (
     Row(
         "navigation",
         NavigationFilter,
@@ -83,11 +101,8 @@ GRAPH = (
         takes=(NAVIGATION_STATE, Input.whole(topics.TARGET)),
         gives=(topics.THRUST, topics.STATUS),
     ),
-)
-"""In the order in which they answer within a tick."""
-
-MODULES = {row.name: row for row in GRAPH}
-"""Rows by name."""
+):
+    add_module(_row)
 
 COMMAND = topics.THRUST
 """What the plant waits for."""
