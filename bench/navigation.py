@@ -43,9 +43,7 @@ def run() -> list[Result]:
     """
     parameters = NavigationParameters(chief=Orbit(6978100.0, inclination=radians(50.0)), tick=1.0)
     samples = [each.measurement for each in simulate_measurements(parameters, 600, np.random.default_rng(1))]
-    every_tenth = [
-        each if index % 10 == 0 else replace(each, sensor=[], reading=[], age=[]) for index, each in enumerate(samples)
-    ]
+    every_tenth = [each if index % 10 == 0 else replace(each, readings=[]) for index, each in enumerate(samples)]
     noise, nothing = process_noise(1e-14, 1.0), np.zeros((6, 6))
     covariance = np.diag(np.repeat([0.25, 2.5e-7], 3))
     sensors, variance = np.array([0, 1, 2]), np.array([25.0, 1e-4, 1e-12])
@@ -59,9 +57,9 @@ def run() -> list[Result]:
         for index, (leg, measurement) in enumerate(zip(legs, every_tenth[1:], strict=True)):
             begun = perf_counter()
             filter.fly(leg, nothing)
-            if measurement.sensor:
+            if measurement.readings:
                 filter.update(
-                    np.array(measurement.reading),
+                    np.array([each.values[0] for each in measurement.readings]),
                     lambda x, chief=leg.next_chief: kernels.read_relative(sensors, chief, x)[1],
                     lambda x, chief=leg.next_chief: kernels.read_relative(sensors, chief, x)[0],
                 )
@@ -74,11 +72,11 @@ def run() -> list[Result]:
         for index, (leg, measurement) in enumerate(zip(legs, every_tenth[1:], strict=True)):
             begun = perf_counter()
             filter.fly(process, leg, noise)
-            if measurement.sensor:
+            if measurement.readings:
                 filter.weigh(
                     Readings(
                         sensors,
-                        np.array(measurement.reading),
+                        np.array([each.values[0] for each in measurement.readings]),
                         nothing[0, :3],
                         variance,
                         leg.next_chief,

@@ -5,11 +5,10 @@ stamp of the header. Times and durations are int nanoseconds of simulated time.
 """
 
 from dataclasses import dataclass, field
-from enum import IntEnum
+from enum import IntEnum, StrEnum
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from formation_gnc.types import Matrix, Times, Vector
 
@@ -28,7 +27,7 @@ class Record:
 
 
 class Sensor(IntEnum):
-    """What a reading measures; the constants of Measurement.msg."""
+    """What a reading measures."""
 
     RADIUS = 0
     RANGE_RATE = 1
@@ -47,21 +46,21 @@ class EstimateStatus(IntEnum):
     CHIEF_LOST = 4
 
 
-class Rejection(IntEnum):
-    """Why something of a measurement was not used: places in `Estimate.rejections`, its constants."""
+class Rejection(StrEnum):
+    """Why something of a measurement was not used; the constants of RejectionCount.msg."""
 
-    NOT_FINITE = 0
-    GATE = 1
-    FUTURE = 2
-    LATE = 3
-    DUPLICATE = 4
-    UNKNOWN_SENSOR = 5
-    NO_DIRECTION = 6
-    OUT_OF_ORDER = 7
-    WRONG_DEPUTY = 8
-    CHIEF = 9
-    AVIONICS = 10
-    FIX = 11
+    NOT_FINITE = "not_finite"
+    GATE = "gate"
+    FUTURE = "future"
+    LATE = "late"
+    DUPLICATE = "duplicate"
+    UNKNOWN_SENSOR = "unknown_sensor"
+    NO_DIRECTION = "no_direction"
+    OUT_OF_ORDER = "out_of_order"
+    WRONG_DEPUTY = "wrong_deputy"
+    CHIEF = "chief"
+    AVIONICS = "avionics"
+    FIX = "fix"
 
 
 class EventKind(IntEnum):
@@ -101,33 +100,62 @@ WARNINGS = frozenset(
 )
 """Kinds of events that somebody should look at."""
 
-Counts = NDArray[np.uint32]
-"""A number for every `Rejection`."""
+
+@dataclass(slots=True)
+class Reading(Record):
+    """What a sensor read."""
+
+    message: ClassVar = "Reading"
+
+    sensor: str
+    values: list[float]
+    age: int
 
 
 @dataclass(slots=True)
 class Measurement(Record):
-    """What one deputy knows at a tick before it thinks."""
+    """What a deputy knows at a tick: sensor readings, own avionics, the chief's ephemeris."""
 
     message: ClassVar = "Measurement"
     frame_id: ClassVar = "inertial"
 
     time: int
+    deputy: str
     chief_state: Vector  # (6,)
-    sensor: list[int]
-    reading: list[float]
-    age: list[float]
+    readings: list[Reading]
     applied_force: Vector  # (3,)
     mass: float
     eclipse: bool
     fix_available: bool
     fix: Vector  # (6,)
-    deputy: str = ""
+
+
+@dataclass(slots=True)
+class Innovation(Record):
+    """How a reading compares with the filter's prediction."""
+
+    message: ClassVar = "Innovation"
+
+    sensor: str
+    values: list[float]
+    standard_deviations: list[float]
+    test_ratio: float
+    rejection: str = ""
+
+
+@dataclass(slots=True)
+class RejectionCount(Record):
+    """How often something of a measurement was rejected for one reason."""
+
+    message: ClassVar = "RejectionCount"
+
+    reason: str  # Rejection
+    count: int
 
 
 @dataclass(slots=True)
 class NavigationState(Record):
-    """What guidance and control use of an estimate, and all that they read of its message."""
+    """Excerpt of an Estimate: all that guidance and control read of its message."""
 
     message: ClassVar = "Estimate"
     frame_id: ClassVar = "hill"
@@ -144,12 +172,10 @@ class Estimate(NavigationState):
 
     covariance: Matrix = field(metadata={"shape": (6, 6)})
     eclipse: bool
-    sensor: list[int]
-    innovation: list[float]
-    innovation_sigma: list[float]
+    innovations: list[Innovation]
     nis: float
-    status: int
-    rejections: Counts = field(default_factory=lambda: np.zeros(len(Rejection), dtype=np.uint32))  # (12,)
+    status: int  # EstimateStatus
+    rejections: list[RejectionCount] = field(default_factory=list)
     unobservable_direction: Vector = field(default_factory=lambda: np.zeros(6))  # (6,)
     unobservable: str = ""
 

@@ -95,11 +95,12 @@ def campaign(parameters: NavigationParameters, ticks: int, runs: int, start: Arr
             error[run, tick] = estimate.relative_state - sample.truth
             squared[run, tick] = nees(estimate, sample.truth)
             nis[run, tick] = estimate.nis
-            if len(estimate.innovation) == count:
-                innovation[run, tick] = np.divide(estimate.innovation, estimate.innovation_sigma)
+            used = [each for each in estimate.innovations if not each.rejection]
+            if len(used) == count:
+                innovation[run, tick] = [each.values[0] / each.standard_deviations[0] for each in used]
             if run == runs - 1:
                 sigma[tick] = np.sqrt(np.diag(estimate.covariance))
-        rejected += int(estimate.rejections.sum())
+        rejected += sum(each.count for each in estimate.rejections)
     return Campaign(error, squared, nis, innovation, sigma, rejected, sample.measurement.chief_state, estimate)
 
 
@@ -318,7 +319,7 @@ def neokleous(directory: Path) -> tuple[str, list[Figure]]:
             kernels.read_relative(np.array([0]), estimate.chief_state, each)[0][0]
             for each in (sample.truth, estimate.relative_state)
         ]
-        radius.append([sample.measurement.reading[0], *expected])
+        radius.append([sample.measurement.readings[0].values[0], *expected])
     true, found, known, radii = map(np.array, (truth, state, sigma, radius))
     minutes = np.arange(len(true)) * 0.1
     figure, axes = plt.subplots(4, 2, figsize=(11, 10), sharex=True, constrained_layout=True)
@@ -480,7 +481,7 @@ def troubles(directory: Path) -> tuple[str, list[Figure]]:
             sigma[tick] = np.sqrt(np.diag(estimate.covariance))
             squares.append(nees(estimate, sample.truth))
             statuses.append(estimate.status)
-        counted += int(estimate.rejections[Rejection.GATE])
+        counted += sum(each.count for each in estimate.rejections if each.reason == Rejection.GATE)
         within.append(np.mean(np.abs(error) <= 3.0 * sigma))
         after.append(np.abs(error[outage.stop + 30, :3] / sigma[outage.stop + 30, :3]).max())
         if run == 0:
@@ -518,18 +519,18 @@ def _spoil(
     measurement: Measurement, parameters: NavigationParameters, rng: np.random.Generator, outage: bool
 ) -> tuple[Measurement, int]:
     """The measurement with readings lost and outliers among the rest, and how many these are."""
-    sensors, readings, outliers = [], [], 0
-    for sensor, reading in zip(measurement.sensor, measurement.reading, strict=True):
+    readings, outliers = [], 0
+    for reading in measurement.readings:
         lost, stray, side = rng.random(3)
         if lost < 0.3 or outage:
             continue
         if stray < 0.01:
-            size = 50.0 * getattr(parameters, f"{NAMES[Sensor(sensor)]}_sigma")
-            reading += size if side < 0.5 else -size
+            size = 50.0 * getattr(parameters, f"{reading.sensor}_sigma")
+            (value,) = reading.values
+            reading = replace(reading, values=[value + (size if side < 0.5 else -size)])
             outliers += 1
-        sensors.append(sensor)
         readings.append(reading)
-    return replace(measurement, sensor=sensors, reading=readings, age=[0.0] * len(sensors)), outliers
+    return replace(measurement, readings=readings), outliers
 
 
 def _plot_troubles(path: Path, tick: float, error: Array, sigma: Array, outage: slice) -> None:

@@ -27,9 +27,7 @@ class Omniscient:
             chief_state=measurement.chief_state,
             mass=measurement.mass,
             eclipse=measurement.eclipse,
-            sensor=[],
-            innovation=[],
-            innovation_sigma=[],
+            innovations=[],
             nis=0.0,
             status=EstimateStatus.TRACKING,
         )

@@ -9,7 +9,6 @@ from formation_gnc.analysis.metrics import deputies_of
 from formation_gnc.errors import BagError
 from formation_gnc.flight import topics
 from formation_gnc.recording.reader import Bag, Fields
-from formation_gnc.records import Rejection
 from formation_gnc.types import Matrix, Vector
 
 Stamps = NDArray[np.int64]
@@ -95,15 +94,24 @@ def estimate_history(bag: Bag, deputy: str) -> EstimateHistory:
         BagError: it has none.
     """
     estimates = _arrays(bag, deputy)
-    counts = zip(Rejection, estimates["rejections"][-1], strict=True)
+    used = np.zeros(len(estimates["time"]), dtype=np.int64)
+    for name in estimates:
+        if name.startswith("innovations.") and name.endswith(".rejection"):
+            used += estimates[name] == ""
     return EstimateHistory(
         estimates["stamp_ns"],
         estimates["relative_state"],
         estimates["covariance"].reshape(-1, 6, 6),
         estimates["nis"],
-        np.array([len(each) for each in estimates["sensor"]]),
-        {reason.name.lower(): int(count) for reason, count in counts if count},
+        used,
+        _last_rejections(estimates),
     )
+
+
+def _last_rejections(estimates: Fields) -> dict[str, int]:
+    reasons = {name: estimates[name][-1] for name in estimates if name.endswith(".reason")}
+    counts = {reason: estimates[name.replace(".reason", ".count")][-1] for name, reason in reasons.items()}
+    return {str(reason): int(number) for reason, number in counts.items() if reason is not None}
 
 
 def figures_of_estimates(estimates: EstimateHistory, stamps: Stamps, truth: Matrix) -> NavigationFigures:

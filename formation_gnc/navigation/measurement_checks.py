@@ -6,10 +6,10 @@ import numpy as np
 
 from formation_gnc.navigation.measurement import NAMES, Readings, StateHistory
 from formation_gnc.orbit.constants import EARTH_RADIUS
-from formation_gnc.records import Counts, Measurement, Rejection, Sensor
+from formation_gnc.records import Measurement, Reading, Rejection, RejectionCount
 from formation_gnc.types import NANOSECONDS, Vector
 
-WORDS = {reason: reason.name.lower().replace("_", " ") for reason in Rejection}
+WORDS = {reason: reason.replace("_", " ") for reason in Rejection}
 
 MEMORY = 20
 """Times of readings of a sensor above which those are forgotten that are too old to come again."""
@@ -17,7 +17,7 @@ MEMORY = 20
 FARTHEST, FASTEST = 1e9, 1.2e4
 """Beyond what orbits about the Earth reach: distance from its centre, m, and speed, m/s."""
 
-_KNOWN = frozenset(int(sensor) for sensor in Sensor)
+_SENSORS = {name: int(sensor) for sensor, name in NAMES.items()}
 
 
 class Rejections:
@@ -25,15 +25,16 @@ class Rejections:
 
     def __init__(self) -> None:
         """Nothing yet."""
-        self.counts: Counts = np.zeros(len(Rejection), dtype=np.uint32)
+        self.counts: list[RejectionCount] = []
         self._seen: dict[tuple[str, Rejection], int] = {}
         self._news: list[tuple[str, str]] = []
 
     def add(self, reason: Rejection, what: str, detail: str = "") -> None:
         """Count a rejection of something, such as a sensor's reading; the 1st, 10th, 100th ... of a kind is
         news."""
-        self.counts = self.counts.copy()  # an estimate already holds the old one
-        self.counts[reason] += 1
+        counts = {each.reason: each.count for each in self.counts}
+        counts[reason] = counts.get(reason, 0) + 1
+        self.counts = [RejectionCount(*each) for each in counts.items()]  # an estimate holds the old ones
         self._seen[what, reason] = seen = self._seen.get((what, reason), 0) + 1
         if str(seen).strip("0") == "1":
             text = f"{WORDS[reason]}, {detail}" if detail else WORDS[reason]
@@ -51,7 +52,7 @@ class Screen:
     def __init__(self, rejections: Rejections) -> None:
         """Remember no reading yet."""
         self._rejections = rejections
-        self._taken: dict[int, list[int]] = {}
+        self._taken: dict[str, list[int]] = {}
 
     def admit(
         self,
@@ -73,21 +74,18 @@ class Screen:
         sensors: list[int] = []
         values: list[float] = []
         ages: list[float] = []
-        count = len(measurement.sensor)
-        if len(measurement.reading) != count or len(measurement.age) != count:
-            self._rejections.add(Rejection.NOT_FINITE, "readings", "a value or age is missing")
-            return None
-        for sensor, value, age in zip(measurement.sensor, measurement.reading, measurement.age, strict=True):
-            if sensor in variance:
-                reason = self._fault(measurement.time, sensor, value, age, latest)
+        for reading in measurement.readings:
+            sensor = _SENSORS.get(reading.sensor)
+            if sensor is None:
+                self._rejections.add(Rejection.UNKNOWN_SENSOR, reading.sensor)
+            elif sensor in variance:
+                reason = self._fault(measurement.time, reading, latest)
                 if reason is None:
                     sensors.append(sensor)
-                    values.append(value)
-                    ages.append(age)
+                    values.append(reading.values[0])
+                    ages.append(reading.age / NANOSECONDS)
                 else:
-                    self._rejections.add(reason, NAMES[Sensor(sensor)])
-            elif sensor not in _KNOWN:
-                self._rejections.add(Rejection.UNKNOWN_SENSOR, f"sensor {sensor}")
+                    self._rejections.add(reason, reading.sensor)
         if not sensors:
             return None
         return Readings(
@@ -100,15 +98,15 @@ class Screen:
             any(ages),
         )
 
-    def _fault(self, time: int, sensor: int, value: float, age: float, latest: float) -> Rejection | None:
-        if not (isfinite(value) and isfinite(age)):
+    def _fault(self, time: int, reading: Reading, latest: float) -> Rejection | None:
+        if len(reading.values) != 1 or not isfinite(reading.values[0]):
             return Rejection.NOT_FINITE
-        if age < 0.0:
+        if reading.age < 0:
             return Rejection.FUTURE
-        if age > latest:
+        if reading.age / NANOSECONDS > latest:
             return Rejection.LATE
-        taken = time - round(age * NANOSECONDS) if age else time
-        known = self._taken.setdefault(sensor, [])
+        taken = time - reading.age
+        known = self._taken.setdefault(reading.sensor, [])
         if taken in known:
             return Rejection.DUPLICATE
         if len(known) > MEMORY:

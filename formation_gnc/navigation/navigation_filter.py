@@ -15,7 +15,7 @@ from formation_gnc.navigation.measurement_checks import Rejections, Screen, cred
 from formation_gnc.navigation.observability import Observability, orbit_period
 from formation_gnc.navigation.process import PROCESS_MODELS, Interval, ProcessModel, process_noise, substeps
 from formation_gnc.parameters import parameter
-from formation_gnc.records import Estimate, EstimateStatus, EventKind, Measurement, Rejection, Sensor
+from formation_gnc.records import Estimate, EstimateStatus, EventKind, Innovation, Measurement, Rejection, Sensor
 from formation_gnc.types import NANOSECONDS, Matrix, Vector
 
 CHIEF_DISTANCE, CHIEF_SPEED = 100.0, 1.0
@@ -230,14 +230,12 @@ class Flight:
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """What became of a tick's readings: those used, and how many the gates rejected."""
+    """What became of a tick's readings."""
 
-    sensor: list[int]
-    innovation: list[float]
-    sigma: list[float]
-    """Predicted standard deviations of the innovations."""
+    innovations: list[Innovation]
     nis: float
-    rejected: int
+    used: int
+    """How many readings passed the gate."""
 
 
 class NavigationFilter(FlightModule[NavigationParameters, Design]):
@@ -434,7 +432,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         """Take the readings, judge the filter by them, and answer; no answer when the state is given up."""
         taken = self._take(flight, measurement)
         if taken is not None:
-            verdict, factor = flight.consistency.judge(taken.nis, len(taken.sensor), taken.rejected)
+            verdict, factor = flight.consistency.judge(taken.nis, taken.used, len(taken.innovations) - taken.used)
             if verdict is Verdict.GIVE_UP:
                 self._give_up(measurement.time, "readings contradict the state, however uncertain")
                 return None
@@ -456,9 +454,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
             chief_state=flight.chief,
             mass=flight.mass,
             eclipse=measurement.eclipse,
-            sensor=taken.sensor if taken else [],
-            innovation=taken.innovation if taken else [],
-            innovation_sigma=taken.sigma if taken else [],
+            innovations=taken.innovations if taken else [],
             nis=taken.nis if taken else 0.0,
             status=int(status),
             rejections=self._rejections.counts,
@@ -471,44 +467,58 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
 
         Raises ArithmeticError when the result is not finite.
         """
-        if not measurement.sensor:
+        if not measurement.readings:
             return None
         variance, latest = self.configuration.design.variance, self.parameters.latest
         readings = flight.screen.admit(measurement, variance, latest, flight.chief, flight.track)
         if readings is None:
             return None
-        admitted = len(readings.value)
-        weighed = self._weigh(flight, readings)
-        if weighed is None:
-            return Taken([], [], [], 0.0, admitted)
-        readings, innovation, spread, jacobian = weighed
+        readings, jacobian, innovations = self._weigh(flight, readings)
+        if jacobian is None:
+            return Taken(innovations, 0.0, 0)
         flight.observability.take(jacobian, readings.variance)
         nis = flight.filter.correct(self._pseudo(readings))
         if not (kernels.sound(flight.filter.x, flight.filter.P) and isfinite(nis)):
             raise ArithmeticError("the update is not finite")
         flight.last_reading = flight.time
-        sensor = readings.sensor.tolist()
-        return Taken(sensor, innovation.tolist(), np.sqrt(spread).tolist(), nis, admitted - len(sensor))
+        return Taken(innovations, nis, len(readings.value))
 
     @np.errstate(all="ignore")  # whatever a reading says; what comes of it is compared
-    def _weigh(self, flight: Flight, readings: Readings) -> tuple[Readings, Vector, Vector, Matrix] | None:
-        """The readings that pass the gate, their innovations, the variances of these and the Jacobian."""
+    def _weigh(self, flight: Flight, readings: Readings) -> tuple[Readings, Matrix | None, list[Innovation]]:
+        """The readings that pass the gate, their Jacobian, and the innovations of all; no Jacobian without any."""
         offset, variance, jacobian = flight.filter.weigh(readings)
         gate = self.configuration.design.gate
         passed = [each * each <= gate * spread for each, spread in zip(offset.tolist(), variance.tolist(), strict=True)]
+        innovations = self._innovations(readings, offset, variance)
         if all(passed):
-            return readings, offset, variance, jacobian
-        distance = np.abs(offset) / np.sqrt(variance)
-        for sensor, off, fits in zip(readings.sensor.tolist(), distance.tolist(), passed, strict=True):
-            name = NAMES[Sensor(sensor)]
-            if not fits and isfinite(off):
-                self._rejections.add(Rejection.GATE, name, f"{off:.1f} standard deviations off")
-            elif not fits:
-                self._rejections.add(Rejection.NO_DIRECTION, name)
+            return readings, jacobian, innovations
+        for innovation, fits in zip(innovations, passed, strict=True):
+            if not fits:
+                self._reject(innovation)
         if not any(passed):
-            return None
+            return readings, None, innovations
         readings = readings.select(np.array(passed))
-        return readings, *flight.filter.weigh(readings)
+        offset, variance, jacobian = flight.filter.weigh(readings)
+        used = iter(self._innovations(readings, offset, variance))
+        return readings, jacobian, [each if each.rejection else next(used) for each in innovations]
+
+    def _innovations(self, readings: Readings, offset: Vector, variance: Vector) -> list[Innovation]:
+        sigma = np.sqrt(variance)
+        columns = readings.sensor, offset, sigma, np.abs(offset) / sigma / self.parameters.gate
+        return [
+            Innovation(NAMES[Sensor(sensor)], [value], [deviation], test_ratio)
+            for sensor, value, deviation, test_ratio in zip(*(each.tolist() for each in columns), strict=True)
+        ]
+
+    def _reject(self, innovation: Innovation) -> None:
+        """Reject the reading of an innovation that is beyond the gate."""
+        if isfinite(innovation.test_ratio):
+            distance = innovation.test_ratio * self.parameters.gate
+            reason, detail = Rejection.GATE, f"{distance:.1f} standard deviations off"
+        else:
+            reason, detail = Rejection.NO_DIRECTION, ""
+        innovation.rejection = reason
+        self._rejections.add(reason, innovation.sensor, detail)
 
     def _pseudo(self, readings: Readings) -> bool:
         if not self.parameters.pseudo_measurements or readings.late:

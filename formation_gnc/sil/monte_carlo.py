@@ -17,7 +17,7 @@ from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import hill_rotation, inertial_from_relative, relative_from_inertial
 from formation_gnc.orbit.propagation import Propagator
 from formation_gnc.plant.sensors import read
-from formation_gnc.records import Estimate, Measurement, Sensor
+from formation_gnc.records import Estimate, Measurement, Reading, Sensor
 from formation_gnc.types import Vector
 
 DEPUTY = "deputy1"
@@ -70,19 +70,17 @@ def simulate_measurements(
             relative,
             Measurement(
                 time=tick * parameters.tick_ns,
+                deputy=DEPUTY,
                 chief_state=chief,
-                sensor=[int(sensor) for sensor in sensors],
-                reading=[
-                    read(sensor, deputy, chief) + sigma * random.standard_normal()
+                readings=[
+                    Reading(NAMES[sensor], [read(sensor, deputy, chief) + sigma * random.standard_normal()], 0)
                     for sensor, sigma in zip(sensors, sigmas, strict=True)
                 ],
-                age=[0.0] * len(sensors),
                 applied_force=force if tick else _AT_REST,
                 mass=mass,
                 eclipse=False,
                 fix_available=tick == 0,
                 fix=relative + fix_sigma * random.standard_normal(6) if tick == 0 else _NO_FIX,
-                deputy=DEPUTY,
             ),
         )
         # White acceleration held over a tick: it adds what the process noise adds.

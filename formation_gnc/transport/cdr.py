@@ -15,20 +15,14 @@ from typing import Any
 import numpy as np
 
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.transport.fields import (
-    LITTLE_ENDIAN,
-    Field,
-    PackingLayout,
-    UnpackingLayout,
-    arguments,
-    pack_times,
-    reject_rows,
-    reject_size,
-    unpack_times,
-)
+from formation_gnc.transport.fields import Field, arguments, pack_times, reject_rows, reject_size, unpack_times
+from formation_gnc.transport.layout import LITTLE_ENDIAN, PackingLayout, UnpackingLayout
 
 PACKERS = 256
-"""Formats of one type of record that are kept for writing, one for all counts that its messages had."""
+"""Layouts of one type of record kept for writing, one for all counts that its messages had."""
+
+LAYOUTS = 16
+"""Layouts kept for reading messages of one length."""
 
 _ENCODE = """
 def encode(record):
@@ -47,9 +41,7 @@ def pack_{name}(record):
 
 _DECODE = """
 def decode(data):
-    layout = layouts.get(len(data))
-    if layout:
-        unpack, counts{lists} = layout
+    for unpack, counts{lists} in layouts.get(len(data), ()):
         _, {targets} = unpack(data)
         if (_, {count_targets}) == counts{inner_counts_agree}:
             return record_type({arguments})
@@ -97,7 +89,7 @@ class Codec[T]:
         self._wanted = {field.name for field in fields(record_type)}  # type: ignore[arg-type]
         self._lists = [field.name for field in message_fields if field.elements and field.name in self._wanted]
         self._has_lists = any(field.elements for field in message_fields)
-        self._layouts: dict[int, tuple[Any, ...]] = {}  # by number of bytes
+        self._layouts: dict[int, list[tuple[Any, ...]]] = {}  # by number of bytes
         names = _NAMES | {
             "record_type": record_type,
             "packer": lru_cache(PACKERS)(self._packer),
@@ -129,7 +121,7 @@ class Codec[T]:
         return ["unpack_inner", "inner_counts", *(f"unpack_{name}" for name in self._lists)]
 
     def _learn(self, data: bytes) -> bytes:
-        """Keep the layout of a message for all of its length with the same counts.
+        """Keep the layout of a message for all that have its length and counts.
 
         Returns:
             The message in little-endian order.
@@ -152,7 +144,8 @@ class Codec[T]:
         if self._has_lists:
             unpackers = [layout.lists[name].unpacker() for name in self._lists]
             known += (layout.inner_format.unpacker(), tuple(layout.inner_counts), *unpackers)
-        self._layouts[len(data)] = known
+        alike = self._layouts.setdefault(len(data), [])
+        alike[:] = [known, *alike[: LAYOUTS - 1]]
         return data
 
     def _packer(self, counts: tuple[int, ...]) -> Callable[..., bytes]:

@@ -193,7 +193,7 @@ def test_one_deputy_does_not_feel_another_nor_its_misses() -> None:
         two, measured_together = observe(together)
         assert np.array_equal(one.deputies[0].inertial_state, two.deputies[0].inertial_state)
         mine, theirs = measured_alone["deputy1"], measured_together["deputy1"]
-        assert mine.reading == theirs.reading
+        assert mine.readings == theirs.readings
         assert mine.fix.tolist() == theirs.fix.tolist()
         alone.step(PUSH)
         missed = together.step(PUSH if tick % 3 == 0 else PUSH | {"deputy2": np.zeros(3)})
@@ -207,7 +207,7 @@ def test_a_miss_does_not_change_the_noise_of_later_readings() -> None:
         for name, flown in (("kept", kept), ("lost", lost)):
             truth, measurements = observe(flown)
             radius = float(np.linalg.norm(truth.deputies[0].inertial_state[:3]))
-            noise[name].append(measurements["deputy1"].reading[0] - radius)
+            noise[name].append(measurements["deputy1"].readings[0].values[0] - radius)
         kept.step({"deputy1": np.zeros(3)})
         lost.step({"deputy1": np.zeros(3)} if tick % 2 else {})
     assert noise["kept"] == pytest.approx(noise["lost"], abs=ROUNDING)
@@ -221,9 +221,9 @@ def test_the_same_seed_gives_the_same_bits_and_another_seed_only_other_noise() -
         )
         assert np.array_equal(truth.deputies[0].inertial_state, same.deputies[0].inertial_state)
         assert np.array_equal(truth.deputies[0].inertial_state, same_too.deputies[0].inertial_state)
-        assert measured["deputy1"].reading == measured_again["deputy1"].reading
-        if measured["deputy1"].reading:
-            assert measured["deputy1"].reading != measured_otherwise["deputy1"].reading
+        assert measured["deputy1"].readings == measured_again["deputy1"].readings
+        if measured["deputy1"].readings:
+            assert measured["deputy1"].readings != measured_otherwise["deputy1"].readings
         for flown in (first, again, other):
             flown.step(PUSH)
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
-from formation_gnc_msgs.msg import Estimate, Event, Measurement, SatelliteTruth, Thrust, Truth
+from formation_gnc_msgs.msg import Estimate, Event, Innovation, Measurement, Reading, SatelliteTruth, Thrust, Truth
 from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
@@ -46,7 +46,7 @@ def flown(ticks: int, first: int = 0) -> list[Recorded]:
     for tick in range(first, first + ticks):
         stamp_ns = tick * 10**9 + 5 * 10**8
         stamp = Time(sec=tick, nanosec=5 * 10**8)
-        readings = [0, 1, 2] if tick % 10 == 0 else []
+        sensors = ["radius", "latitude"][: 1 + tick // 40] if tick % 10 == 0 else []
         deputies = [
             SatelliteTruth(name=name, inertial_state=rng.normal(size=6), mass=100.0 - tick, eclipse=tick % 3 == 0)
             for name in ("deputy1", "the second deputy")
@@ -61,7 +61,9 @@ def flown(ticks: int, first: int = 0) -> list[Recorded]:
             ),
             record(
                 "/deputy1/measurement",
-                Measurement(header=header, sensor=readings, reading=rng.normal(size=len(readings)), mass=99.5),
+                Measurement(
+                    header=header, readings=[Reading(sensor=each, values=[rng.normal()]) for each in sensors], mass=99.5
+                ),
                 stamp_ns,
             ),
             record(
@@ -70,7 +72,7 @@ def flown(ticks: int, first: int = 0) -> list[Recorded]:
                     header=header,
                     relative_state=rng.normal(size=6),
                     covariance=rng.normal(size=36),
-                    innovation=rng.normal(size=len(readings)),
+                    innovations=[Innovation(sensor=each, values=rng.normal(size=tick // 40)) for each in sensors],
                     nis=float(tick),
                     status=tick % 2,
                 ),

@@ -65,7 +65,7 @@ def retyped(flown: Path, directory: Path, change: Callable[[TopicDefinition], To
 def older(definition: TopicDefinition) -> TopicDefinition:
     """Messages as an older package had them: fields of other names."""
     schema = definition.schema
-    for name in (b"mass", b"relative_state", b"reading", b"force", b"iterations", b"kind"):
+    for name in (b"mass", b"relative_state", b"readings", b"force", b"iterations", b"kind"):
         schema = schema.replace(b" " + name, b" old_" + name)
     return TopicDefinition(definition.type_name, schema, metadata=definition.metadata)
 

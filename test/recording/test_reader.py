@@ -9,7 +9,7 @@ from itertools import groupby
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Duration
-from formation_gnc_msgs.msg import Event, Measurement, Target
+from formation_gnc_msgs.msg import Event, Measurement, Reading, Target
 from hypothesis import given
 from hypothesis import strategies as st
 from mcap.reader import make_reader
@@ -61,7 +61,10 @@ def test_arrays_hold_what_was_sent(bag_path, flight) -> None:
     assert arrays["status"].tolist() == [m.message.status for m in estimates]
     assert arrays["header.stamp.sec"].tolist() == [m.message.header.stamp.sec for m in estimates]
     assert set(arrays["header.frame_id"]) == {"hill"}
-    assert [list(row) for row in arrays["innovation"]] == [list(m.message.innovation) for m in estimates]
+    for row, recorded in enumerate(estimates):
+        for index, innovation in enumerate(recorded.message.innovations):
+            assert arrays[f"innovations.{index}.sensor"][row] == innovation.sensor
+            assert list(arrays[f"innovations.{index}.values"][row]) == list(innovation.values)
 
 
 def test_arrays_number_nested_messages_and_keep_text(bag_path, flight) -> None:
@@ -86,8 +89,7 @@ def test_decoded_messages_have_the_fields_as_attributes(bag_path, flight) -> Non
     st.lists(
         st.builds(
             Measurement,
-            sensor=st.lists(st.integers(0, 255), max_size=3),
-            reading=st.lists(finite, max_size=3),
+            readings=st.lists(st.builds(Reading, sensor=text, values=st.lists(finite, max_size=3)), max_size=3),
             mass=finite,
             eclipse=st.booleans(),
             fix=st.lists(finite, min_size=6, max_size=6),
@@ -102,8 +104,11 @@ def test_arrays_equal_what_ros_itself_deserialises(messages) -> None:
     arrays = kind.arrays(data)
     for row, raw in enumerate(data):
         truth = deserialize_message(raw, Measurement)
-        for field in ("sensor", "reading", "mass", "eclipse", "fix"):
+        for field in ("mass", "eclipse", "fix"):
             assert np.array_equal(arrays[field][row], getattr(truth, field)), field
+        for index, reading in enumerate(truth.readings):
+            assert arrays[f"readings.{index}.sensor"][row] == reading.sensor
+            assert np.array_equal(arrays[f"readings.{index}.values"][row], reading.values)
 
 
 @given(st.lists(st.builds(Event, node=text, subject=text, detail=text, tick=st.integers(0, 2**64 - 1)), min_size=1))
