@@ -151,7 +151,7 @@ def test_environment_before_the_build_says_what_to_run_and_keeps_the_shell(tmp_p
 
 
 @needs_set_up
-def test_every_node_is_where_ros2_run_looks_and_runs_in_the_projects_python():
+def test_every_node_is_where_ros2_run_looks_and_runs_in_our_python():
     executables = ROOT / "install/formation_gnc/lib/formation_gnc"
     assert {path.name for path in executables.iterdir()} >= NODES
     for node in NODES:
@@ -165,7 +165,7 @@ def test_another_ros_is_rejected_in_one_line():
     assert re.fullmatch(r"formation_gnc: .*Jazzy.*humble.*\n", result.stderr)
 
 
-def test_a_sourced_jazzy_is_used_and_a_virtual_environment_with_the_wheels_is_not(tmp_path):
+def test_a_sourced_jazzy_is_used_but_a_venv_of_wheels_is_not(tmp_path):
     for prefix in ("jazzy", "wheels"):
         (tmp_path / prefix / "share/rclpy").mkdir(parents=True)
     (tmp_path / "wheels/pyvenv.cfg").touch()
@@ -268,7 +268,7 @@ def test_the_launch_file_starts_all_deputies_of_any_scenario(launch_double, scen
     assert [node.executable for node in nodes if hasattr(node, "on_exit")] == ["plant"]
 
 
-def test_the_launch_file_takes_a_path_and_by_itself_flies_the_default_scenario(launch_double, tmp_path):
+def test_launch_file_takes_a_path_and_defaults_to_leader_follower(launch_double, tmp_path):
     assert {node.executable for node in started(launch_double)} == NODES
     path = tmp_path / "own.yaml"
     path.write_text("/plant: {ros__parameters: {duration: 9.0}}\n")
