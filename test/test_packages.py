@@ -16,6 +16,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
+import yaml
 
 import formation_gnc
 from formation_gnc.sil.scenario import load_scenario
@@ -194,6 +195,31 @@ def test_the_lock_pins_every_package_with_its_hashes():
         assert len(entries) > 10
         for entry in entries:
             assert re.match(r"[a-z0-9-]+==\S+ \\\n    --hash=sha256:[0-9a-f]{64}", entry), entry.split("\n")[0]
+
+
+def test_pre_commit_runs_the_checks_of_make_check():
+    (checks,) = re.findall(r"^check:.*\n\t@\$\(in_environment\) (.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    (repository,) = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text())["repos"]
+    assert repository["repo"] == "local", "nothing is fetched"
+    hooks = [re.sub(r"^\.venv/bin/| --force-exclude", "", hook["entry"]) for hook in repository["hooks"]]
+    assert hooks == [check.removesuffix(" .") for check in checks.split(" && ")]
+    assert {hook["language"] for hook in repository["hooks"]} == {"system"}
+
+
+def test_versions_and_authors_of_the_citation_are_those_of_the_package():
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert citation["version"] == formation_gnc.__version__
+    assert [each["name"] for each in citation["authors"]] == ["formation_gnc maintainers"]
+    assert f"\n## {formation_gnc.__version__} - " in (ROOT / "CHANGELOG.md").read_text()
+
+
+def test_both_locks_pin_the_same_version_of_what_they_share():
+    one, other = (
+        dict(re.findall(r"^([a-z0-9-]+)==(\S+)", (ROOT / name).read_text(), re.MULTILINE))
+        for name in ("requirements.lock", "requirements-verify.lock")
+    )
+    shared = one.keys() & other.keys()
+    assert {name: one[name] for name in shared} == {name: other[name] for name in shared}
 
 
 LAUNCH_FILE = ROOT / "launch/sil.launch.py"
