@@ -7,17 +7,18 @@ in_environment := source ./env.sh &&
 # An installed ROS puts pytest plug-ins of its own in the way.
 pytest := python -m pytest --disable-plugin-autoload -p pytest_randomly -p pytest_timeout -p _hypothesis_pytestplugin
 
-.PHONY: help setup demo test check bench verify lock clean force
+.PHONY: help setup demo test test-fast check bench verify lock clean force
 
 help:
-	@echo "make demo    fly the default scenario on the node graph, and record it"
-	@echo "make test    lint, types and the test suite"
-	@echo "make check   lint and types"
-	@echo "make bench   measure speed, into build/bench.json"
-	@echo "make verify  long runs against independent programs, into docs/verification/"
-	@echo "make setup   the environment alone; then: source env.sh"
-	@echo "make lock    pin the newest versions that requirements*.in allow (takes uv)"
-	@echo "make clean   remove what was built; .venv and bags/ stay"
+	@echo "make demo        fly the default scenario on the node graph, and record it"
+	@echo "make test        lint, types and the test suite"
+	@echo "make test-fast   the tests that start no node processes"
+	@echo "make check       lint and types"
+	@echo "make bench       measure speed, into build/bench.json"
+	@echo "make verify      long runs against independent programs, into docs/verification/"
+	@echo "make setup       the environment alone; then: source env.sh"
+	@echo "make lock        pin the newest versions that requirements*.in allow (takes uv)"
+	@echo "make clean       remove what was built; .venv and bags/ stay"
 
 setup: install/.ready
 
@@ -29,6 +30,9 @@ check: setup
 
 test: check
 	@$(in_environment) $(pytest) --timeout 300 -m "not slow"
+
+test-fast: setup
+	@$(in_environment) $(pytest) --timeout 300 -m "not sil and not slow"
 
 bench: .venv/.verify
 	@$(in_environment) python -m bench

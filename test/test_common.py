@@ -22,7 +22,7 @@ def test_a_tick_that_stamps_cannot_carry_is_rejected(tick: float) -> None:
     )
 
 
-def test_mean_motion_of_a_geostationary_orbit_is_one_turn_in_a_sidereal_day() -> None:
+def test_geostationary_mean_motion_is_one_turn_per_sidereal_day() -> None:
     # 42164.17 km is printed to 5 m, which is 2e-7 of a period
     period = 2.0 * math.pi / CommonParameters(Orbit(42_164_172.0)).mean_motion
     assert period == pytest.approx(86_164.1, rel=5e-7)

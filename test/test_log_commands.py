@@ -24,6 +24,8 @@ from formation_gnc.transport.conversion import codec
 from formation_gnc.transport.in_process_recorder import reader
 from formation_gnc.types import NANOSECONDS
 
+pytestmark = pytest.mark.usefixtures("without_pictures")
+
 
 @pytest.fixture(autouse=True)
 def handlers() -> Iterator[None]:

@@ -16,6 +16,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
+import yaml
 
 import formation_gnc
 from formation_gnc.sil.scenario import load_scenario
@@ -151,7 +152,7 @@ def test_environment_before_the_build_says_what_to_run_and_keeps_the_shell(tmp_p
 
 
 @needs_set_up
-def test_every_node_is_where_ros2_run_looks_and_runs_in_the_projects_python():
+def test_every_node_is_where_ros2_run_looks_and_runs_in_our_python():
     executables = ROOT / "install/formation_gnc/lib/formation_gnc"
     assert {path.name for path in executables.iterdir()} >= NODES
     for node in NODES:
@@ -165,7 +166,7 @@ def test_another_ros_is_rejected_in_one_line():
     assert re.fullmatch(r"formation_gnc: .*Jazzy.*humble.*\n", result.stderr)
 
 
-def test_a_sourced_jazzy_is_used_and_a_virtual_environment_with_the_wheels_is_not(tmp_path):
+def test_a_sourced_jazzy_is_used_but_a_venv_of_wheels_is_not(tmp_path):
     for prefix in ("jazzy", "wheels"):
         (tmp_path / prefix / "share/rclpy").mkdir(parents=True)
     (tmp_path / "wheels/pyvenv.cfg").touch()
@@ -194,6 +195,31 @@ def test_the_lock_pins_every_package_with_its_hashes():
         assert len(entries) > 10
         for entry in entries:
             assert re.match(r"[a-z0-9-]+==\S+ \\\n    --hash=sha256:[0-9a-f]{64}", entry), entry.split("\n")[0]
+
+
+def test_pre_commit_runs_the_checks_of_make_check():
+    (checks,) = re.findall(r"^check:.*\n\t@\$\(in_environment\) (.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    (repository,) = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text())["repos"]
+    assert repository["repo"] == "local", "nothing is fetched"
+    hooks = [re.sub(r"^\.venv/bin/| --force-exclude", "", hook["entry"]) for hook in repository["hooks"]]
+    assert hooks == [check.removesuffix(" .") for check in checks.split(" && ")]
+    assert {hook["language"] for hook in repository["hooks"]} == {"system"}
+
+
+def test_versions_and_authors_of_the_citation_are_those_of_the_package():
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert citation["version"] == formation_gnc.__version__
+    assert [each["name"] for each in citation["authors"]] == ["formation_gnc maintainers"]
+    assert f"\n## {formation_gnc.__version__} - " in (ROOT / "CHANGELOG.md").read_text()
+
+
+def test_both_locks_pin_the_same_version_of_what_they_share():
+    one, other = (
+        dict(re.findall(r"^([a-z0-9-]+)==(\S+)", (ROOT / name).read_text(), re.MULTILINE))
+        for name in ("requirements.lock", "requirements-verify.lock")
+    )
+    shared = one.keys() & other.keys()
+    assert {name: one[name] for name in shared} == {name: other[name] for name in shared}
 
 
 LAUNCH_FILE = ROOT / "launch/sil.launch.py"
@@ -268,7 +294,7 @@ def test_the_launch_file_starts_all_deputies_of_any_scenario(launch_double, scen
     assert [node.executable for node in nodes if hasattr(node, "on_exit")] == ["plant"]
 
 
-def test_the_launch_file_takes_a_path_and_by_itself_flies_the_default_scenario(launch_double, tmp_path):
+def test_launch_file_takes_a_path_and_defaults_to_leader_follower(launch_double, tmp_path):
     assert {node.executable for node in started(launch_double)} == NODES
     path = tmp_path / "own.yaml"
     path.write_text("/plant: {ros__parameters: {duration: 9.0}}\n")

@@ -1,11 +1,12 @@
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from formation_gnc.flight import topics
 from formation_gnc.parameters import dump, leaves, load
-from formation_gnc.recording.layout import foxglove_layout
-from formation_gnc.reference import LAYOUT_PAGE, PAGE, SCHEMAS, page
+from tools.architecture import ROOT
+from tools.write_reference import COMMAND, PAGES, SCHEMAS, parameters_page
 
 NEEDED = {
     "chief.semi_major_axis": 7.0e6,
@@ -14,12 +15,9 @@ NEEDED = {
 }
 
 
-def test_the_page_of_parameters_is_up_to_date() -> None:
-    assert PAGE.read_text() == page(), "run `python -m formation_gnc.reference` and commit docs/reference"
-
-
-def test_the_layout_for_foxglove_is_up_to_date() -> None:
-    assert LAYOUT_PAGE.read_text() == foxglove_layout(["deputy1"]), "run `python -m formation_gnc.reference`"
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_generated_documentation_is_up_to_date(page: Path) -> None:
+    assert page.read_text() == PAGES[page](), f"run `{COMMAND}` and commit {page.relative_to(ROOT)}"
 
 
 @pytest.mark.parametrize("node", SCHEMAS)
@@ -40,16 +38,16 @@ def test_a_node_can_be_made_from_what_must_be_given_alone(node: str) -> None:
 
 @pytest.mark.parametrize("node", SCHEMAS)
 def test_the_page_has_every_parameter_of_every_node(node: str) -> None:
-    text = page()
+    text = parameters_page()
     for leaf in leaves(SCHEMAS[node], {"deputies": ["DEPUTY"]}):
         assert f"| `{leaf.name}` | {leaf.type_name} |" in text
 
 
 def test_the_page_of_topics_names_every_topic_and_every_message() -> None:
-    text = PAGE.with_name("topics.md").read_text()
+    text = (ROOT / "docs/reference/topics.md").read_text()
     names = [topic.name for topic in (*topics.RUN_TOPICS, *topics.DEPUTY_TOPICS)]
     assert len(names) > 10
     for name in names:
         assert f"| `{name}` |" in text
-    for message in (PAGE.parents[2] / "msg_defs" / "msg").glob("*.msg"):
+    for message in (ROOT / "msg_defs/msg").glob("*.msg"):
         assert f"[`{message.stem}`](../../msg_defs/msg/{message.name})" in text

@@ -10,8 +10,10 @@ from formation_gnc.control.weights import QuadraticWeights
 from formation_gnc.recording.reader import Bag
 from formation_gnc.sil.scenario import find_scenario, load_scenario
 
+pytestmark = pytest.mark.usefixtures("without_pictures")
+
 SCENARIOS = sorted(path.stem for path in find_scenario("leader_follower").parent.glob("*.yaml"))
-TICKS = 200
+TICKS = 60
 
 
 @pytest.mark.parametrize("name", SCENARIOS)

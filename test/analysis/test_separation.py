@@ -35,6 +35,7 @@ def test_one_satellite_is_near_to_none() -> None:
     assert minimum_separation(np.zeros(1), np.zeros((1, 1, 3)), ["alone"]) is None
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_what_guidance_foresaw_is_the_least_of_all_it_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

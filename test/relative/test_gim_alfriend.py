@@ -92,7 +92,7 @@ def test_error_falls_with_the_square_of_j2():
 def test_transition_beats_tschauner_and_hempels_by_the_order_of_j2():
     elements = Elements(8e6, 0.1, 1.0, 0.3, 0.4, 0.5)
     model = GimAlfriendModel(elements)
-    duration = 5.0 * model.period
+    duration = 2.0 * model.period
     exact = scaled(elements, OblateModel(model.chief).transition(0.0, duration))
     size = np.abs(exact).max()
     errors = [

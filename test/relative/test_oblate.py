@@ -63,7 +63,7 @@ def test_attraction_of_these_tests_is_the_gradient_of_the_potential():
 def test_motion_is_the_difference_of_two_inertial_orbits(elements, state):
     chief = state_from_elements(elements)
     model = OblateModel(OblateChief(elements))
-    duration = 0.6 * elements.period
+    duration = 0.3 * elements.period
     expected = relative_from_inertial(
         inertial(chief, duration), inertial(inertial_from_relative(chief, state), duration)
     )
@@ -131,10 +131,10 @@ def test_bounded_motion_stays_where_that_of_two_bodies_drifts_away():
     state = np.array([100.0, 200.0, -50.0, 0.1, -0.2, 0.05])
 
     def drift(start):
-        """Change of the mean along-track position over one revolution, m: revolution 4 against 3."""
-        period, states = model.period, [model.propagate(0.0, start, 3.0 * model.period)]
+        """Change of the mean along-track position over one revolution, m: the second against the first."""
+        period, states = model.period, [start]
         for index in range(32):
-            states.append(model.propagate((3.0 + index / 16) * period, states[-1], period / 16))
+            states.append(model.propagate(index / 16 * period, states[-1], period / 16))
         along = [s[1] for s in states]
         return np.mean(along[16:32]) - np.mean(along[:16])
 
