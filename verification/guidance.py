@@ -24,7 +24,7 @@ from formation_gnc.guidance.assignment import assign, assign_with_phase, transfe
 from formation_gnc.guidance.registry import FORMATIONS
 from formation_gnc.guidance.targets import TARGET_MODELS, TargetPath
 from formation_gnc.orbit.elements import Elements, state_from_elements
-from formation_gnc.orbit.forces import Forces
+from formation_gnc.orbit.forces.model import Forces
 from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
 from formation_gnc.orbit.propagation import Propagator
 from formation_gnc.recording import Bag, identical
@@ -72,7 +72,7 @@ def flown(starts: Array, common: CommonParameters, forces: Forces) -> Array:
     none, history = np.zeros_like(states[:, :3]), []
     for index in range(ORBITS * POINTS + 1):
         history.append([relative_from_inertial(states[0], deputy) for deputy in states[1:]])
-        states = propagator.advance(index * step, states, none)
+        states = propagator.propagate(index * step, states, none)
     return np.array(history).transpose(1, 0, 2)
 
 
