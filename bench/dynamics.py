@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from bench.result import Result, interleaved
 from formation_gnc.orbit.constants import EARTH_RADIUS
 from formation_gnc.orbit.elements import Elements, state_from_elements
-from formation_gnc.orbit.forces import Body, Forces
+from formation_gnc.orbit.forces.force import Body
+from formation_gnc.orbit.forces.model import Forces
 from formation_gnc.orbit.propagation import Propagator
 from verification.independent import Basilisk, Heyoka
 
@@ -38,7 +39,7 @@ def ours(forces: Forces) -> Callable[[], float]:
     def day() -> None:
         states = STATES
         for k in range(int(DAY)):
-            states = propagator.advance(float(k), states, thrust)
+            states = propagator.propagate(float(k), states, thrust)
 
     return lambda: timed(day)
 

@@ -6,6 +6,7 @@ from math import sqrt
 
 from formation_gnc.errors import ParameterError
 from formation_gnc.orbit.constants import MU
+from formation_gnc.orbit.elements import Elements
 from formation_gnc.parameters import parameter
 from formation_gnc.types import NANOSECONDS
 
@@ -54,6 +55,11 @@ class CommonParameters:
     def tick_ns(self) -> int:
         """Tick, ns."""
         return round(self.tick * NANOSECONDS)
+
+    @cached_property
+    def chief_elements(self) -> Elements:
+        """The chief's osculating elements at the start; raises OrbitError for an orbit that cannot be flown."""
+        return Elements(**vars(self.chief))
 
     @cached_property
     def mean_motion(self) -> float:

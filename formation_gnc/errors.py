@@ -2,7 +2,7 @@
 
 
 class ConfigurationError(ValueError):
-    """A value that is not allowed; base of all errors of this module.
+    """A value that is not allowed; base of the errors of set-up.
 
     Raised while a run is set up or a parameter changed, never in flight. A command prints the message as one
     line and ends with status 2.
@@ -23,3 +23,7 @@ class DesignError(ConfigurationError):
 
 class BagError(ConfigurationError):
     """A bag that cannot be read or written, or lacks a topic or field that is asked for."""
+
+
+class ImpactError(RuntimeError):
+    """In flight: a satellite has come down; its state lies below the Earth's surface, or is not finite."""

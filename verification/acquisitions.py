@@ -145,9 +145,9 @@ class HillTruth(Propagator):
         super().__init__(common.tick, math.ceil(common.tick / 10.0), epoch=common.epoch)
         self._model = HillModel(common.mean_motion)
 
-    def fly(self, time: float, states: Array, forces: Array, masses: Array) -> Array:
+    def propagate_with_thrust(self, time: float, states: Array, forces: Array, masses: Array) -> Array:
         """States one tick later."""
-        chief = self.advance(time, states[:1], np.zeros((1, 3)))[0]
+        chief = self.propagate(time, states[:1], np.zeros((1, 3)))[0]
         moved = [
             self._model.propagate(0.0, relative_from_inertial(states[0], state), self._tick, force / mass)
             for state, force, mass in zip(states[1:], forces[1:], masses[1:], strict=True)

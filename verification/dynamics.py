@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from formation_gnc.orbit.constants import EARTH_RADIUS, J2, MU
 from formation_gnc.orbit.elements import Elements, state_from_elements
-from formation_gnc.orbit.forces import Body, Forces
+from formation_gnc.orbit.forces.force import Body
+from formation_gnc.orbit.forces.model import Forces
 from formation_gnc.orbit.frames import relative_from_inertial
 from formation_gnc.orbit.propagation import Propagator
 from verification.figure import TABLE, Figure, failures
@@ -50,7 +51,7 @@ def fly(orbit: Elements, forces: Forces, tick: float = 1.0, duration: float = DA
     propagator = Propagator(tick, 1, forces, (BODY,), epoch)
     states, thrust = state_from_elements(orbit)[None], np.zeros((1, 3))
     for k in range(round(duration / tick)):
-        states = propagator.advance(k * tick, states, thrust)
+        states = propagator.propagate(k * tick, states, thrust)
     return states[0]
 
 
@@ -194,7 +195,7 @@ def conservation(directory: Path) -> tuple[str, list[Figure]]:
             for k in range(ticks + 1):
                 if k % every == 0:
                     history.append(states[0])
-                states = propagator.advance(float(k), states, thrust)
+                states = propagator.propagate(float(k), states, thrust)
             flown = np.array(history)
             radius = np.linalg.norm(flown[:, :3], axis=1)
             oblate = strength * (EARTH_RADIUS / radius) ** 2 * (3 * (flown[:, 2] / radius) ** 2 - 1) / 2
@@ -248,8 +249,8 @@ def neokleous(directory: Path) -> tuple[str, list[Figure]]:
         for k in range(round(duration / tick) + 1):
             relative.append(relative_from_inertial(reference[0], states[0])[:3])
             change.append(np.linalg.norm(states[0, :3]) - radius)
-            states = real.advance(k * tick, states, thrust)
-            reference = ideal.advance(k * tick, reference, thrust)
+            states = real.propagate(k * tick, states, thrust)
+            reference = ideal.propagate(k * tick, reference, thrust)
         minutes = np.arange(len(change)) * tick / 60.0
         charts[0, column].plot(minutes, np.array(change) / 1e3, color="black")
         charts[0, column].set_title(name, fontsize=10)

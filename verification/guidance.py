@@ -24,12 +24,11 @@ from formation_gnc.guidance.assignment import assign, assign_with_phase, transfe
 from formation_gnc.guidance.registry import FORMATIONS
 from formation_gnc.guidance.targets import TARGET_MODELS, TargetPath
 from formation_gnc.orbit.elements import Elements, state_from_elements
-from formation_gnc.orbit.forces import Forces
+from formation_gnc.orbit.forces.model import Forces
 from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
 from formation_gnc.orbit.propagation import Propagator
 from formation_gnc.recording import Bag, identical
 from formation_gnc.relative.hill import HillModel
-from formation_gnc.relative.tschauner_hempel import TschaunerHempelModel
 from verification.figure import TABLE, Figure, failures
 
 mpl.use("Agg")
@@ -42,6 +41,9 @@ CIRCULAR = CommonParameters(Orbit(7078136.3, 0.0, 1.7104, 0.0, 0.0, 0.0))
 ECCENTRIC = CommonParameters(Orbit(7078136.3 / 0.9, 0.1, 1.7104, 0.0, 0.5, 0.0))
 CHIEFS = (("circular, 700 km, i = 98 deg", CIRCULAR), ("e = 0.1, perigee 700 km", ECCENTRIC))
 CASES = 100
+MODELS = ("hill", "yamanaka_ankersen", "j2_mean_motion")
+"""Of the target, in the tables."""
+
 CHANGE = 8890.0
 """When the scenario tetrahedral changes its formation, s."""
 
@@ -72,7 +74,7 @@ def flown(starts: Array, common: CommonParameters, forces: Forces) -> Array:
     none, history = np.zeros_like(states[:, :3]), []
     for index in range(ORBITS * POINTS + 1):
         history.append([relative_from_inertial(states[0], deputy) for deputy in states[1:]])
-        states = propagator.advance(index * step, states, none)
+        states = propagator.propagate(index * step, states, none)
     return np.array(history).transpose(1, 0, 2)
 
 
@@ -80,10 +82,7 @@ def own_flight(starts: Array, model: str, common: CommonParameters, carried: lis
     """(satellites, N, 6) free flight of `starts` under the target's own model, step by step."""
     instants = times(common)
     step = float(instants[1])
-    if model == "yamanaka_ankersen":
-        linear = TschaunerHempelModel(carried[0]._model.chief)  # type: ignore[attr-defined]
-    else:
-        linear = HillModel(common.mean_motion) if model == "hill" else carried[0]._model  # type: ignore[attr-defined]
+    linear = HillModel(common.mean_motion) if model == "hill" else carried[0].model  # type: ignore[attr-defined]
     states, history = starts, [starts]
     for instant in instants[:-1]:
         states = states @ linear.transition(float(instant), step).T
@@ -113,7 +112,7 @@ def drifts(directory: Path) -> tuple[str, list[Figure]]:
             "|---|---|---|---|---|",
         ]
         for name in FORMATIONS:
-            for model in TARGET_MODELS:
+            for model in MODELS:
                 carried = [path(name, slot, model, common) for slot in places(name)]
                 targets = np.array([each.states(times(common)) for each in carried])
                 size = float(np.linalg.norm(targets[..., :3], axis=2).max())

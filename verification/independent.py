@@ -30,8 +30,9 @@ from jplephem.spk import SPK
 from numpy.typing import NDArray
 
 from formation_gnc.orbit.constants import EARTH_RADIUS, EARTH_ROTATION_RATE, MU, NORMALISED_ZONALS
-from formation_gnc.orbit.forces import Body, Forces
 from formation_gnc.orbit.forces.egm2008 import NORMALISED_C, NORMALISED_S
+from formation_gnc.orbit.forces.force import Body
+from formation_gnc.orbit.forces.model import Forces
 from formation_gnc.orbit.forces.radiation import SOLAR_PRESSURE
 from formation_gnc.orbit.forces.third_body import MU_MOON, MU_SUN
 from formation_gnc.orbit.sky import earth_rotation_angle, moon, sun

@@ -2,7 +2,6 @@
 
 import math
 from abc import abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,24 +11,15 @@ from numpy.linalg import LinAlgError
 from formation_gnc.common import CommonParameters
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
 from formation_gnc.control.lqr import LinearQuadraticRegulator, LqrParameters
+from formation_gnc.control.models import PLAN_MODELS
 from formation_gnc.control.plan import Plan, Task
 from formation_gnc.control.target_prediction import has_jumped, target_after
 from formation_gnc.control.weights import QuadraticWeights
 from formation_gnc.errors import ConfigurationError, DesignError
-from formation_gnc.orbit.elements import Elements, elements_from_state
+from formation_gnc.orbit.elements import elements_from_state
 from formation_gnc.parameters import parameter
 from formation_gnc.records import NavigationState, Target
-from formation_gnc.relative.chief import KeplerChief, OblateChief
-from formation_gnc.relative.model import RelativeModel
-from formation_gnc.relative.nonlinear import NonlinearModel
-from formation_gnc.relative.oblate import OblateModel
 from formation_gnc.types import NANOSECONDS, Matrix
-
-PLAN_MODELS: dict[str, Callable[[Elements], RelativeModel]] = {
-    "nonlinear": lambda chief: NonlinearModel(KeplerChief.of(chief)),
-    "oblate": lambda chief: OblateModel(OblateChief(chief)),
-}
-"""The nonlinear models that a plan can be made on, by name; their time zero is that of the elements."""
 
 MAX_STEPS = 500
 """Steps of the longest plan."""

@@ -17,15 +17,9 @@ import numpy as np
 from numpy.linalg import LinAlgError
 
 from formation_gnc.control.riccati import RiccatiMap
-from formation_gnc.relative.chief import Chief
-from formation_gnc.relative.factorisation import oblateness, sdc1, sdc2
 from formation_gnc.relative.model import INPUT, Array, RelativeModel
-from formation_gnc.relative.nonlinear import NonlinearModel
-from formation_gnc.relative.oblate import OblateModel
+from formation_gnc.relative.nonlinear import FactorisedModel
 from formation_gnc.types import Matrix, Vector
-
-FACTORISATIONS = {"sdc1": sdc1, "sdc2": sdc2}
-"""Joshi's methods I and II, by name."""
 
 MIN_EIGENVALUE = 1e-10
 """Smallest eigenvalue of the Gramian, normalised to a unit diagonal, at which it counts as regular."""
@@ -39,18 +33,14 @@ def state_dependent(model: RelativeModel, factorisation: str, times: Vector) -> 
     """The factorised equations of motion of a model, for states at times (M,), s.
 
     Raises:
-        ValueError: the model is neither nonlinear nor oblate.
+        ValueError: the model has no factorisation.
     """
-    if not isinstance(model, NonlinearModel | OblateModel):
+    if not isinstance(model, FactorisedModel):
         raise ValueError(f"{type(model).__name__} has no factorisation")
-    chief: Chief = model.chief
-    along = chief.along(times)
-    oblate = isinstance(model, OblateModel)
+    along = model.chief.along(times)
 
     def system(states: Array) -> tuple[Array, Array]:
-        matrices: Array = FACTORISATIONS[factorisation](states, along)
-        if oblate:
-            matrices[..., 3:, :3] += oblateness(states, along)
+        matrices = model.factorised(states, along, factorisation)
         return matrices, np.broadcast_to(INPUT, (len(matrices), 6, 3))
 
     return system

@@ -10,7 +10,7 @@ from formation_gnc.common import CommonParameters
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
 from formation_gnc.control.linear import LinearController
 from formation_gnc.control.mixed_sensitivity import MixedSensitivityProblem, WeightingFunction
-from formation_gnc.control.models import DESIGN_MODELS
+from formation_gnc.control.models import DESIGN_MODELS, TIME_INVARIANT_MODELS
 from formation_gnc.control.riccati import spectral_radius
 from formation_gnc.errors import DesignError
 from formation_gnc.parameters import parameter
@@ -24,7 +24,7 @@ class HinfParameters:
 
     model: str = parameter(
         "hill",
-        choices=("hill", "schweighart_sedwick"),
+        choices=TIME_INVARIANT_MODELS,
         in_flight=True,
         doc="relative-motion model of the design",
     )

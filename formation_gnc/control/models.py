@@ -1,23 +1,25 @@
-"""The relative-motion models that a law can be designed on, by name."""
+"""The relative-motion models that laws work with, by name: those of the registry that can serve."""
 
 from collections.abc import Callable
 
 from formation_gnc.common import CommonParameters
 from formation_gnc.orbit.elements import Elements
-from formation_gnc.relative.chief import KeplerChief
-from formation_gnc.relative.hill import HillModel
-from formation_gnc.relative.j2_gradient import J2GradientModel
 from formation_gnc.relative.model import RelativeModel
-from formation_gnc.relative.schweighart_sedwick import CircularReference, SchweighartSedwickModel
-from formation_gnc.relative.tschauner_hempel import TschaunerHempelModel
+from formation_gnc.relative.nonlinear import FactorisedModel
+from formation_gnc.relative.registry import MODELS
 
-DESIGN_MODELS: dict[str, Callable[[CommonParameters], RelativeModel]] = {
-    "hill": lambda common: HillModel(common.mean_motion),
-    "schweighart_sedwick": lambda common: SchweighartSedwickModel(CircularReference.of(_elements(common))),
-    "j2_gradient": lambda common: J2GradientModel(CircularReference.of(_elements(common))),
-    "tschauner_hempel": lambda common: TschaunerHempelModel(KeplerChief.of(_elements(common))),
+
+def _about(model: type[RelativeModel]) -> Callable[[CommonParameters], RelativeModel]:
+    return lambda common: model.about(common.chief_elements)
+
+
+DESIGN_MODELS = {name: _about(model) for name, model in MODELS.items() if model.is_linear and model.is_periodic}
+"""Linear models, the same in every revolution, that a law can be designed on."""
+
+TIME_INVARIANT_MODELS = tuple(name for name in DESIGN_MODELS if MODELS[name].is_time_invariant)
+"""Those of `DESIGN_MODELS` that do not vary along the orbit."""
+
+PLAN_MODELS: dict[str, Callable[[Elements], FactorisedModel]] = {
+    name: model.about for name, model in MODELS.items() if issubclass(model, FactorisedModel)
 }
-
-
-def _elements(common: CommonParameters) -> Elements:
-    return Elements(**vars(common.chief))
+"""Nonlinear models that a plan can be made on; their time zero is that of the chief's elements."""

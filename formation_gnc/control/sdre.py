@@ -8,15 +8,16 @@ import numpy as np
 from formation_gnc.common import CommonParameters
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
 from formation_gnc.control.feed_forward import FeedForward
-from formation_gnc.control.finite_horizon import PLAN_MODELS
-from formation_gnc.control.fixed_endpoint_lq import FACTORISATIONS, discretise, state_dependent
+from formation_gnc.control.fixed_endpoint_lq import discretise, state_dependent
 from formation_gnc.control.integral import IntegralWeights, integrated, with_integral
 from formation_gnc.control.lqr import LinearQuadraticRegulator, LqrParameters
+from formation_gnc.control.models import PLAN_MODELS
 from formation_gnc.control.riccati import Weights, stationary_gain
 from formation_gnc.errors import ConfigurationError, DesignError
 from formation_gnc.orbit.elements import Elements, elements_from_state
 from formation_gnc.parameters import parameter
 from formation_gnc.records import NavigationState, Target
+from formation_gnc.relative.factorisation import FACTORISATIONS
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.model import INPUT
 from formation_gnc.types import NANOSECONDS, Matrix, Vector

@@ -6,7 +6,6 @@ import numpy as np
 
 from formation_gnc.control.finite_horizon import FiniteHorizonController, FiniteHorizonParameters
 from formation_gnc.control.fixed_endpoint_lq import (
-    FACTORISATIONS,
     Cost,
     discretise,
     solve_fixed_endpoint,
@@ -14,6 +13,7 @@ from formation_gnc.control.fixed_endpoint_lq import (
 )
 from formation_gnc.control.plan import Plan, Task
 from formation_gnc.parameters import parameter
+from formation_gnc.relative.factorisation import FACTORISATIONS
 
 
 @dataclass(frozen=True)

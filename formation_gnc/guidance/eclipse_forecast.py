@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from formation_gnc.common import CommonParameters
+from formation_gnc.errors import ImpactError
 from formation_gnc.orbit.eclipse import eclipses
-from formation_gnc.orbit.propagation import ImpactError
 from formation_gnc.records import NO_ECLIPSES
 from formation_gnc.types import NANOSECONDS, Times, Vector
 

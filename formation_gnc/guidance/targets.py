@@ -2,8 +2,8 @@
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from functools import cache
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,11 +19,9 @@ from formation_gnc.orbit.elements import (
     true_from_mean_anomaly,
 )
 from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
-from formation_gnc.orbit.mean import mean_elements, secular_rates
-from formation_gnc.relative.chief import KeplerChief
-from formation_gnc.relative.hill import HarmonicModel, HillModel
+from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.model import LinearModel
-from formation_gnc.relative.tschauner_hempel import TschaunerHempelModel
+from formation_gnc.relative.registry import MODELS
 from formation_gnc.types import Matrix, Vector
 
 CHECKS = 24
@@ -64,7 +62,7 @@ class TargetPath(ABC):
         Raises:
             ConfigurationError: the path starts on no orbit about the Earth.
         """
-        chief = Elements(**vars(self._common.chief))
+        chief = self._common.chief_elements
         inertial = state_from_elements(chief)
         times = np.linspace(0.0, math.tau / self._common.mean_motion, CHECKS + 1)
         path = self.states(times)
@@ -96,7 +94,7 @@ def _advanced(orbit: Elements, time: float) -> Vector:
 
 
 class HillPath(TargetPath):
-    """The formation itself, by the closed form of Hill's equations, as about a circular orbit."""
+    """The formation's own states, which are solutions of Hill's equations about a circular orbit."""
 
     def states(self, times: Vector) -> Matrix:
         """(N, 6) states of the formation."""
@@ -107,97 +105,47 @@ class HillPath(TargetPath):
         return transitions
 
 
-class _StartedPath(TargetPath):
-    """Free motion in another model, from a start that looks like the formation's.
+class ModelPath(TargetPath):
+    """Free motion in a linear model, from a start that resembles the formation's.
 
     The start has the formation's position, its radial and cross-track rates in proportion to the model's own
-    frequencies there, and the along-track rate that does not drift in the model, plus the formation's own
-    drift.
+    rates there, and the along-track rate that does not drift in the model, plus the formation's own drift.
+    About an eccentric chief (Yamanaka and Ankersen) the radial motion then keeps the formation's shape in the
+    true anomaly f, x = c1 sin f + c2 cos f; along and across the track the path is stretched with the chief's
+    distance. At the mean rates under J2 the phase follows the truth.
     """
 
-    def _start(self, model: LinearModel, in_plane: float, across: float) -> Vector:
-        n = self._common.mean_motion
-        given = self._formation.states(np.array([self._ahead]))[0]
+    def __init__(
+        self, model: type[LinearModel], formation: Formation[Any], phase: float, common: CommonParameters
+    ) -> None:
+        """Start at time zero; raises OrbitError where the model does not exist about the chief."""
+        super().__init__(formation, phase, common)
+        self.model = model.about(common.chief_elements)
+        n, (in_plane, across) = common.mean_motion, self.model.phase_rates(0.0)
+        given = formation.states(np.array([self._ahead]))[0]
         start = given * np.array([1.0, 1.0, 1.0, in_plane / n, 1.0, across / n])
-        bounded: Vector = model.bounded(0.0, start)
-        bounded[4] += given[4] + 2.0 * n * given[0]
-        return bounded
-
-
-class YamanakaAnkersenPath(_StartedPath):
-    """Periodic motion about a chief of any eccentricity (Yamanaka and Ankersen).
-
-    In the true anomaly f the radial motion keeps the formation's shape exactly, x = c1 sin f + c2 cos f;
-    along the track and across it the path is drawn out with the chief's distance.
-    """
-
-    def __init__(self, formation: Formation[Any], phase: float, common: CommonParameters) -> None:
-        """Start at the chief's anomaly at time zero."""
-        super().__init__(formation, phase, common)
-        chief = KeplerChief.of(Elements(**vars(common.chief)))
-        rate = chief.at(0.0).angular_rate
-        self._model = TschaunerHempelModel(chief)
-        self._state = self._start(self._model, rate, rate)
+        self._start: Vector = self.model.bounded(0.0, start)
+        self._start[4] += given[4] + 2.0 * n * given[0]
 
     def states(self, times: Vector) -> Matrix:
-        """(N, 6) states, a transition matrix each."""
-        return self._transitions(0.0, times) @ self._state
+        """(N, 6) states by the model's transition matrices."""
+        return self._transitions(0.0, times) @ self._start
 
     def _transitions(self, time: float, ahead: Vector) -> Matrix:
-        return np.array([self._model.transition(time, time + float(later)) for later in ahead])
-
-
-@dataclass(frozen=True)
-class J2MeanMotionModel(HarmonicModel):
-    """Hill's equations at the rates that J2 gives a near-circular chief on average.
-
-    The Hill frame turns, and the nodes come round, at the rate of the mean argument of latitude; the ellipse
-    of the relative motion comes round at that of the mean anomaly, since the chief's perigee turns. Mean
-    elements: the osculating semi-major axis would give the mean motion to a part in a thousand only.
-    """
-
-    latitude_rate: float
-    anomaly_rate: float
-
-    @classmethod
-    @cache  # slot assignment makes hundreds of paths about one chief
-    def of(cls, osculating: Elements) -> "J2MeanMotionModel":
-        """The rates of a chief with these osculating elements."""
-        _, perigee, anomaly = secular_rates(mean_elements(osculating))
-        return cls(perigee + anomaly, anomaly)
-
-    @property
-    def frequencies(self) -> tuple[float, float, float]:
-        """Frame's rate, in-plane and cross-track frequency, rad/s."""
-        return self.latitude_rate, self.anomaly_rate, self.latitude_rate
-
-
-class J2MeanMotionPath(_StartedPath):
-    """Free motion at the mean rates under J2: the phase keeps up with the truth, the shape shears with it."""
-
-    def __init__(self, formation: Formation[Any], phase: float, common: CommonParameters) -> None:
-        """Start at the phase at time zero."""
-        super().__init__(formation, phase, common)
-        self._model = J2MeanMotionModel.of(Elements(**vars(common.chief)))
-        _, in_plane, across = self._model.frequencies
-        self._state = self._start(self._model, in_plane, across)
-
-    def states(self, times: Vector) -> Matrix:
-        """(N, 6) states in closed form."""
-        return self._transitions(0.0, times) @ self._state
-
-    def _transitions(self, time: float, ahead: Vector) -> Matrix:
-        transitions: Matrix = self._model.transition(0.0, ahead)
-        return transitions
+        return self.model.transitions(time, ahead)
 
     def error(self) -> tuple[float, float]:
-        """As Hill's: about a point mass, the rates that J2 gives would count as an error."""
-        return HillPath(self._formation, self._phase, self._common).error()
+        """As `TargetPath.error`; of Hill's path where the model has J2, which the reference has not."""
+        if self.model.has_j2:
+            return HillPath(self._formation, self._phase, self._common).error()
+        return super().error()
 
 
-TARGET_MODELS: dict[str, type[TargetPath]] = {
-    "hill": HillPath,
-    "yamanaka_ankersen": YamanakaAnkersenPath,
-    "j2_mean_motion": J2MeanMotionPath,
+def _path(model: type[LinearModel]) -> Callable[[Formation[Any], float, CommonParameters], TargetPath]:
+    return HillPath if model is HillModel else partial(ModelPath, model)
+
+
+TARGET_MODELS = {
+    name: _path(model) for name, model in MODELS.items() if issubclass(model, LinearModel) and model.has_closed_form
 }
-"""The models that a target can move by, by name."""
+"""The models of the registry that a target can move by, by name: linear and in closed form."""

@@ -10,9 +10,8 @@ import numpy as np
 
 from formation_gnc.common import CommonParameters
 from formation_gnc.navigation import kernels
-from formation_gnc.orbit.elements import Elements
-from formation_gnc.relative.hill import HarmonicModel, HillModel
-from formation_gnc.relative.schweighart_sedwick import CircularReference, SchweighartSedwickModel
+from formation_gnc.relative.model import RelativeModel
+from formation_gnc.relative.registry import MODELS
 from formation_gnc.types import Matrix, Vector
 
 LONGEST_STEP = 10.0
@@ -76,13 +75,13 @@ class NonlinearProcess(ProcessModel):
 
 
 class LinearProcess(ProcessModel):
-    """A time-invariant linear model about the chief's orbit at the start of the run, in closed form.
+    """A time-invariant linear model about the chief's orbit at the start of the run.
 
     What it leaves out (eccentricity, curvature, the turning of the thrust in the Hill frame over a tick)
     has to be covered by the process noise.
     """
 
-    def __init__(self, model: HarmonicModel) -> None:
+    def __init__(self, model: RelativeModel) -> None:
         """With the model's own transition matrices."""
         self._discretise = lru_cache(maxsize=64)(lambda duration: model.discretise(0.0, duration))
 
@@ -113,13 +112,16 @@ def process_noise(density: float, duration: float) -> Matrix:
     return density * np.block([[cubic, square], [square, duration * unit]])
 
 
-def _reference(common: CommonParameters) -> CircularReference:
-    return CircularReference.of(Elements(**vars(common.chief)))
+def _process(model: type[RelativeModel]) -> Callable[[CommonParameters], ProcessModel] | None:
+    """How a filter predicts with a model; None when it cannot."""
+    if model.is_exact_under_j2:
+        return lambda common: NonlinearProcess()
+    if model.is_linear and model.is_time_invariant:
+        return lambda common: LinearProcess(model.about(common.chief_elements))
+    return None
 
 
 PROCESS_MODELS: dict[str, Callable[[CommonParameters], ProcessModel]] = {
-    "nonlinear_j2": lambda common: NonlinearProcess(),
-    "schweighart_sedwick": lambda common: LinearProcess(SchweighartSedwickModel(_reference(common))),
-    "hill": lambda common: LinearProcess(HillModel(common.mean_motion)),
+    name: process for name, model in MODELS.items() if (process := _process(model)) is not None
 }
-"""The models to choose from, by name."""
+"""The models of the registry that a filter can predict with, by name."""

@@ -33,7 +33,7 @@ def eclipses(state: Array, duration: float, step: float, epoch: float = 0.0) -> 
     propagator = Propagator(step, epoch=epoch)
     states = [np.array(state, dtype=np.float64)]
     for index in range(count):
-        states.append(propagator.advance(index * step, states[-1][None], np.zeros((1, 3)))[0])
+        states.append(propagator.propagate(index * step, states[-1][None], np.zeros((1, 3)))[0])
     dark = [propagator.illumination(index * step, each) < 1.0 for index, each in enumerate(states)]
 
     def crossing(index: int) -> float:

@@ -11,7 +11,7 @@ from math import atan2, cos, hypot, isfinite, pi, sin, sqrt, tau
 import numpy as np
 from numpy.typing import NDArray
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import OrbitError
 from formation_gnc.orbit.constants import EARTH_RADIUS, MU
 
 Array = NDArray[np.float64]
@@ -25,7 +25,7 @@ class Elements:
     """Keplerian elements of a closed orbit about the Earth: metres and radians.
 
     Raises:
-        ConfigurationError: for values that are not finite, open orbits, perigees below the Earth's surface
+        OrbitError: for values that are not finite, open orbits, perigees below the Earth's surface
         and
             inclinations outside [0, pi].
     """
@@ -42,15 +42,15 @@ class Elements:
         for field in fields(self):
             value = getattr(self, field.name)
             if not isfinite(value):
-                raise ConfigurationError(f"{field.name} is {value}: it must be finite")
+                raise OrbitError(f"{field.name} is {value}: it must be finite")
         if not self.semi_major_axis > 0.0:
-            raise ConfigurationError(f"semi_major_axis is {self.semi_major_axis} m: it must be above zero")
+            raise OrbitError(f"semi_major_axis is {self.semi_major_axis} m: it must be above zero")
         if not 0.0 <= self.eccentricity < 1.0:
-            raise ConfigurationError(f"eccentricity is {self.eccentricity}: it must be in [0, 1)")
+            raise OrbitError(f"eccentricity is {self.eccentricity}: it must be in [0, 1)")
         if not 0.0 <= self.inclination <= pi:
-            raise ConfigurationError(f"inclination is {self.inclination} rad: it must be in [0, pi]")
+            raise OrbitError(f"inclination is {self.inclination} rad: it must be in [0, pi]")
         if self.perigee_radius < EARTH_RADIUS:
-            raise ConfigurationError(
+            raise OrbitError(
                 f"perigee radius is {self.perigee_radius:.1f} m: it must be at least the Earth's, {EARTH_RADIUS:.1f} m"
             )
 
@@ -108,24 +108,24 @@ def elements_from_state(state: Array, mu: float = MU) -> Elements:
         mu: gravitational parameter, m^3/s^2.
 
     Raises:
-        ConfigurationError: for states that are not finite, of zero radius, rectilinear, or on an open orbit
+        OrbitError: for states that are not finite, of zero radius, rectilinear, or on an open orbit
         or
             one that meets the Earth's surface.
     """
     values = [float(value) for value in state]
     if len(values) != 6 or not all(isfinite(value) for value in values):
-        raise ConfigurationError(f"inertial state is {values}: it must be six finite numbers")
+        raise OrbitError(f"inertial state is {values}: it must be six finite numbers")
     rx, ry, rz, vx, vy, vz = values
     radius = sqrt(rx * rx + ry * ry + rz * rz)
     if radius == 0.0:
-        raise ConfigurationError("radius is 0 m: it must be above zero")
+        raise OrbitError("radius is 0 m: it must be above zero")
     hx, hy, hz = ry * vz - rz * vy, rz * vx - rx * vz, rx * vy - ry * vx
     h = sqrt(hx * hx + hy * hy + hz * hz)
     if h == 0.0:
-        raise ConfigurationError("angular momentum is 0 m^2/s: the orbit must have a plane")
+        raise OrbitError("angular momentum is 0 m^2/s: the orbit must have a plane")
     inverse_axis = 2.0 / radius - (vx * vx + vy * vy + vz * vz) / mu
     if inverse_axis <= 0.0:
-        raise ConfigurationError(
+        raise OrbitError(
             f"specific orbital energy is {-0.5 * mu * inverse_axis:.6g} J/kg: it must be below zero (a closed orbit)"
         )
     hx, hy, hz = hx / h, hy / h, hz / h
@@ -165,10 +165,10 @@ def eccentric_anomaly(mean_anomaly: float, eccentricity: float) -> float:
         E, rad, on the same turn as M.
 
     Raises:
-        ConfigurationError: for an eccentricity outside [0, 1).
+        OrbitError: for an eccentricity outside [0, 1).
     """
     if not 0.0 <= eccentricity < 1.0:
-        raise ConfigurationError(f"eccentricity is {eccentricity}: it must be in [0, 1)")
+        raise OrbitError(f"eccentricity is {eccentricity}: it must be in [0, 1)")
     turns = tau * round(mean_anomaly / tau)
     target = mean_anomaly - turns
     # The function is monotonic: Newton's steps kept in a shrinking bracket always arrive, at e near 1 too.

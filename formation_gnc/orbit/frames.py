@@ -18,7 +18,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import OrbitError
 from formation_gnc.orbit.jit import ANY_MATRIX, ANY_VECTOR, inline, kernel
 
 Array = NDArray[np.float64]
@@ -51,14 +51,14 @@ def hill_rotation(chief: Array) -> Array:
         (3, 3); its rows are the Hill axes x, y, z in inertial components.
 
     Raises:
-        ConfigurationError: if the chief has no orbit plane (zero radius or rectilinear motion).
+        OrbitError: if the chief has no orbit plane (zero radius or rectilinear motion).
     """
     rx, ry, rz, vx, vy, vz = map(float, chief)
     hx, hy, hz = ry * vz - rz * vy, rz * vx - rx * vz, rx * vy - ry * vx
     radius = sqrt(rx * rx + ry * ry + rz * rz)
     momentum = sqrt(hx * hx + hy * hy + hz * hz)
     if not (radius > 0.0 and momentum > 0.0):
-        raise ConfigurationError(
+        raise OrbitError(
             f"chief state {list(map(float, chief))} has no orbit plane: radius and angular momentum must be above zero"
         )
     rx, ry, rz = rx / radius, ry / radius, rz / radius

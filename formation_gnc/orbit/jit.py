@@ -9,6 +9,7 @@ function.
 import os
 import tempfile
 from collections.abc import Callable
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -24,9 +25,9 @@ ANY_MATRIX = numba.types.Array(numba.float64, 2, "A", readonly=True)
 _HERE = Path(__file__).resolve().parent
 
 
-def _cache_directory() -> str:
+def _cache_directory(key: str = "") -> str:
     """First writable place for compiled code, or an empty string when there is none."""
-    digest = sha256()
+    digest = sha256(key.encode())
     for source in sorted(_HERE.rglob("*.py")):
         digest.update(source.read_bytes())
     user_cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
@@ -43,22 +44,24 @@ def _cache_directory() -> str:
     return ""
 
 
-_CACHE = _cache_directory()
+_directory_for = cache(_cache_directory)
 
 
-def kernel[F: Callable[..., Any]](signature: Any) -> Callable[[F], F]:
+def kernel[F: Callable[..., Any]](signature: Any, key: str = "") -> Callable[[F], F]:
     """Compile a function, when its module is imported, for exactly this signature.
 
     Without fastmath and threads: the same input gives the same bits. Division by zero follows IEEE 754.
 
     Args:
         signature: numba signature; arguments of other types are rejected, layouts are as declared.
+        key: digest of what the function calls outside this package and its own file.
     """
+    directory = _directory_for(key)
 
     def compile_function(function: F) -> F:
-        previous, numba.config.CACHE_DIR = numba.config.CACHE_DIR, _CACHE
+        previous, numba.config.CACHE_DIR = numba.config.CACHE_DIR, directory
         try:
-            compiled: F = numba.njit(signature, cache=bool(_CACHE), error_model="numpy")(function)
+            compiled: F = numba.njit(signature, cache=bool(directory), error_model="numpy")(function)
         finally:
             numba.config.CACHE_DIR = previous
         return compiled
@@ -67,6 +70,9 @@ def kernel[F: Callable[..., Any]](signature: Any) -> Callable[[F], F]:
 
 
 def inline[F: Callable[..., Any]](function: F) -> F:
-    """Compile a function for use inside kernels: scalars and tuples in, scalars and tuples out."""
-    compiled: F = numba.njit(error_model="numpy")(function)
+    """Compile a function for use inside kernels, into which it is always inlined.
+
+    Fast with scalars and tuples as arguments; arrays cost more.
+    """
+    compiled: F = numba.njit(error_model="numpy", forceinline=True)(function)
     return compiled

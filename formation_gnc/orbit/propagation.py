@@ -1,6 +1,6 @@
 """Numerical propagation of inertial states, tick by tick, with thrust held over the tick.
 
-Fixed steps of order eight: the same input gives the same bits, and the end of a tick is met exactly.
+Fixed steps of order eight: the same input gives the same bits, and ticks end exactly on a step.
 """
 
 from collections.abc import Callable, Sequence
@@ -8,66 +8,67 @@ from math import inf, isfinite
 
 import numpy as np
 from numba import float64, int64
+from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import ConfigurationError, ImpactError
 from formation_gnc.orbit.constants import EARTH_RADIUS
-from formation_gnc.orbit.forces import SKY, Body, Forces, acceleration, look_up
+from formation_gnc.orbit.forces.force import Body
+from formation_gnc.orbit.forces.model import CACHE_KEY, COEFFICIENTS, SETTINGS, Forces, acceleration
 from formation_gnc.orbit.forces.radiation import illumination
 from formation_gnc.orbit.frames import inertial_acceleration
 from formation_gnc.orbit.gravity import oblate_acceleration, oblate_gradient
 from formation_gnc.orbit.jit import ANY_MATRIX, ANY_VECTOR, kernel
 from formation_gnc.orbit.runge_kutta import COUPLING, INSTANT_OF_STAGE, INSTANTS, STAGES, WEIGHTS
-from formation_gnc.orbit.sky import sun
-from formation_gnc.parameters import leaves
+from formation_gnc.orbit.sky import EPHEMERIDES, look_up, sun
 
 Array = NDArray[np.float64]
 
 
-class ImpactError(RuntimeError):
-    """A satellite has come down: its state lies below the Earth's surface, or is not a number."""
+_TICK = (float64[:, ::1], ANY_MATRIX, ANY_VECTOR, float64[:, ::1], float64[::1], int64, float64, float64, int64)
+"""Signature of the kernels of a tick. They work in place: boxing a result array costs more than the rest of the
+call."""
 
 
-_TICK = (float64[:, ::1], ANY_MATRIX, ANY_VECTOR, float64[:, ::1], int64[::1], float64, float64, int64)
-"""What the kernels of a tick are given. They move the states on in place: to make Python an array of the
-result costs more than all else of the call."""
-
-
-@kernel(_TICK)
-def _advance(
+@kernel(_TICK, CACHE_KEY)
+def _propagate(
     states: Array,
     thrust: Array,
     masses: Array,
-    areas: Array,
-    on: NDArray[np.int64],
+    coefficients: Array,
+    settings: Array,
+    needed: int,
     time: float,
     tick: float,
     substeps: int,
 ) -> int:
-    """Move states on by a tick; returns the first satellite that is no longer above the surface, or -1."""
+    """Propagate states by a tick; returns the first satellite that is no longer above the surface, or -1."""
     step = tick / substeps
     coupling, weights = COUPLING.copy(), WEIGHTS.copy()  # constants would be unrolled: seconds to compile
     satellites = states.shape[0]
-    sky = np.zeros((len(INSTANTS), SKY))
+    ephemerides = np.zeros((len(INSTANTS), EPHEMERIDES))
+    per_mass = np.zeros(COEFFICIENTS)
+    # Tuples stay in registers; with arrays a tick takes a third longer.
+    settings_ = to_fixed_tuple(settings, SETTINGS)
     rates = np.empty((STAGES, 6))
     stage = np.empty(6)
     for substep in range(substeps):
         for instant in range(len(INSTANTS)):
-            look_up(on, time + (substep + INSTANTS[instant]) * step, sky[instant])
+            look_up(needed, time + (substep + INSTANTS[instant]) * step, ephemerides[instant])
         for satellite in range(satellites):
-            drag_area, light_area = 0.0, 0.0
-            if len(areas) > 0:
-                drag_area = areas[satellite, 0] / masses[satellite]
-                light_area = areas[satellite, 1] / masses[satellite]
+            if len(coefficients) > 0:
+                for force in range(COEFFICIENTS):
+                    per_mass[force] = coefficients[satellite, force] / masses[satellite]
+            coefficients_ = to_fixed_tuple(per_mass, COEFFICIENTS)
             for i in range(STAGES):
                 for c in range(6):
                     change = 0.0
                     for j in range(i):
                         change += coupling[i, j] * rates[j, c]
                     stage[c] = states[satellite, c] + step * change
-                x, y, z, vx, vy, vz = stage
-                ax, ay, az = acceleration(on, sky[INSTANT_OF_STAGE[i]], drag_area, light_area, x, y, z, vx, vy, vz)
-                rates[i, 0], rates[i, 1], rates[i, 2] = vx, vy, vz
+                sky = to_fixed_tuple(ephemerides[INSTANT_OF_STAGE[i]], EPHEMERIDES)
+                ax, ay, az = acceleration(settings_, coefficients_, sky, to_fixed_tuple(stage, 6))
+                rates[i, 0], rates[i, 1], rates[i, 2] = stage[3], stage[4], stage[5]
                 rates[i, 3] = ax + thrust[satellite, 0]
                 rates[i, 4] = ay + thrust[satellite, 1]
                 rates[i, 5] = az + thrust[satellite, 2]
@@ -83,20 +84,44 @@ def _advance(
     return -1
 
 
-@kernel(_TICK)
-def _fly(
+@kernel(_TICK, CACHE_KEY)
+def _propagate_with_thrust(
     states: Array,
     forces: Array,
     masses: Array,
-    areas: Array,
-    on: NDArray[np.int64],
+    coefficients: Array,
+    settings: Array,
+    needed: int,
     time: float,
     tick: float,
     substeps: int,
 ) -> int:
-    """`_advance` under forces along the Hill axes of the first."""
+    """`_propagate` under forces along the Hill axes of the first satellite."""
     thrust = inertial_acceleration(states[0], forces, masses)
-    return _advance(states, thrust, masses, areas, on, time, tick, substeps)
+    return _propagate(states, thrust, masses, coefficients, settings, needed, time, tick, substeps)
+
+
+@kernel(float64[:, ::1](ANY_MATRIX, ANY_VECTOR, float64[:, ::1], float64[::1], int64, float64), CACHE_KEY)
+def _accelerations(
+    states: Array, masses: Array, coefficients: Array, settings: Array, needed: int, time: float
+) -> Array:
+    """(N, 3) accelerations at states (N, 6)."""
+    out = np.empty((len(states), 3))
+    ephemerides = np.zeros(EPHEMERIDES)
+    look_up(needed, time, ephemerides)
+    per_mass, state = np.zeros(COEFFICIENTS), np.empty(6)
+    for satellite in range(len(states)):
+        if len(coefficients) > 0:
+            for force in range(COEFFICIENTS):
+                per_mass[force] = coefficients[satellite, force] / masses[satellite]
+        state[:] = states[satellite]
+        out[satellite, 0], out[satellite, 1], out[satellite, 2] = acceleration(
+            to_fixed_tuple(settings, SETTINGS),
+            to_fixed_tuple(per_mass, COEFFICIENTS),
+            to_fixed_tuple(ephemerides, EPHEMERIDES),
+            to_fixed_tuple(state, 6),
+        )
+    return out
 
 
 @kernel(float64(float64, ANY_VECTOR))
@@ -106,7 +131,7 @@ def _illumination(time: float, position: Array) -> float:
 
 
 class Propagator:
-    """Truth of a set of satellites, each in its own orbit about the Earth."""
+    """Numerical propagation of a set of satellites about the Earth, tick by tick."""
 
     def __init__(
         self,
@@ -121,12 +146,12 @@ class Propagator:
         Args:
             tick: time between calls, s.
             substeps: integration steps in a tick; at least one.
-            forces: which act; J2 alone by default.
-            bodies: one for each satellite, as the states; needed for drag and radiation pressure.
+            forces: force model; point mass and J2 by default.
+            bodies: one for each satellite, in the order of the states; needed for drag and radiation pressure.
             epoch: time zero of the run, Terrestrial Time since J2000.0, s; it places Sun, Moon and Greenwich.
 
         Raises:
-            ConfigurationError: a value that is not allowed, or a body missing for a force that acts on it.
+            ConfigurationError: a value that is not allowed, or no bodies for a force that acts on them.
         """
         if not 0.0 < tick < inf:
             raise ConfigurationError(f"tick is {tick} s: it must be finite and above zero")
@@ -135,19 +160,12 @@ class Propagator:
         if not isfinite(epoch):
             raise ConfigurationError(f"epoch is {epoch} s: it must be finite")
         forces = forces or Forces()
-        if (forces.drag or forces.radiation_pressure) and not bodies:
-            raise ConfigurationError("bodies is empty: drag and radiation pressure need one for each satellite")
-        for body in bodies:
-            for leaf in leaves(Body, {}):
-                leaf.check(getattr(body, leaf.name))
-        self._switches = forces.switches()
+        self._settings, self._needed = forces.settings(), forces.ephemerides()
+        self._coefficients = forces.coefficients(bodies)
         self._tick, self._substeps, self._epoch = tick, substeps, epoch
-        self._areas = np.array(
-            [(body.area * body.drag_coefficient, body.area * body.reflectivity) for body in bodies]
-        ).reshape(-1, 2)
         self._masses = np.array([body.mass for body in bodies])
 
-    def advance(self, time: float, states: Array, accelerations: Array, masses: Array | None = None) -> Array:
+    def propagate(self, time: float, states: Array, accelerations: Array, masses: Array | None = None) -> Array:
         """States one tick later, with the given accelerations held, fixed in inertial space.
 
         Args:
@@ -157,34 +175,56 @@ class Propagator:
             masses: present masses, (N,), kg; those of the bodies by default.
 
         Returns:
-            (N, 6); the arguments are left alone.
+            (N, 6); the arguments are left unchanged.
 
         Raises:
             ImpactError: a satellite has come down.
         """
-        return self._after(_advance, time, states, accelerations, self._masses if masses is None else masses)
+        return self._after(_propagate, time, states, accelerations, self._masses if masses is None else masses)
 
-    def fly(self, time: float, states: Array, forces: Array, masses: Array) -> Array:
-        """`advance` under forces along the Hill axes that the first satellite has at the start, (N, 3), N."""
-        return self._after(_fly, time, states, forces, masses)
+    def propagate_with_thrust(self, time: float, states: Array, forces: Array, masses: Array) -> Array:
+        """`propagate` with forces (N, 3), N, along the Hill axes of the first satellite at the start of the tick."""
+        return self._after(_propagate_with_thrust, time, states, forces, masses)
+
+    def acceleration(self, time: float, states: Array, masses: Array | None = None) -> Array:
+        """Acceleration of each satellite by all forces in use, gravity included, without thrust.
+
+        Args:
+            time: time since the epoch, s.
+            states: inertial states, (N, 6), m and m/s.
+            masses: present masses, (N,), kg; those of the bodies by default.
+
+        Returns:
+            (N, 3), inertial, m/s^2.
+        """
+        self._check_count(states)
+        present = self._masses if masses is None else masses
+        result: Array = _accelerations(
+            states, present, self._coefficients, self._settings, self._needed, self._epoch + time
+        )
+        return result
+
+    def _check_count(self, states: Array) -> None:
+        if len(self._coefficients) not in (0, len(states)):
+            raise ConfigurationError(f"{len(self._coefficients)} bodies for {len(states)} satellites: each needs one")
 
     def _after(
         self,
-        move: Callable[..., int],
+        kernel_of_tick: Callable[..., int],
         time: float,
         states: Array,
         thrust: Array,
         masses: Array,
     ) -> Array:
-        if len(self._areas) not in (0, len(states)):
-            raise ConfigurationError(f"{len(self._areas)} bodies for {len(states)} satellites: each needs one")
+        self._check_count(states)
         result = states.copy()
-        fallen = move(
+        fallen = kernel_of_tick(
             result,
             thrust,
             masses,
-            self._areas,
-            self._switches,
+            self._coefficients,
+            self._settings,
+            self._needed,
             self._epoch + time,
             self._tick,
             self._substeps,
@@ -197,18 +237,18 @@ class Propagator:
         return result
 
     def illumination(self, time: float, position: Array) -> float:
-        """Fraction of the Sun's disc that a satellite sees: 0 in umbra, 1 in full sunlight.
+        """Visible fraction of the Sun's disc: 0 in umbra, 1 in full sunlight.
 
         Args:
             time: time since the epoch, s.
-            position: inertial, (3,), m; a state will do.
+            position: inertial, (3,), m, or the state it begins, (6,).
         """
         return _illumination(self._epoch + time, position)
 
 
 @kernel((ANY_VECTOR, ANY_VECTOR, float64, int64))
 def advance_with_transition(state: Array, acceleration: Array, tick: float, substeps: int = 1) -> tuple[Array, Array]:
-    """State and state transition matrix after a tick, point mass with J2: what a filter predicts with.
+    """State and state transition matrix after a tick, under the point mass with J2.
 
     Args:
         state: inertial, (6,), m and m/s.

@@ -8,10 +8,20 @@ s``, right to a second since 2017 and until the next leap second.
 
 from math import cos, floor, pi, sin, tau
 
+import numpy as np
+from numpy.typing import NDArray
+
 from formation_gnc.orbit.jit import inline
 
 ASTRONOMICAL_UNIT = 149597870700.0
 """Metre, IAU 2012."""
+
+SUN, MOON, EARTH_ROTATION = 1, 2, 4
+"""Ephemerides that a force may need, as bits."""
+
+EPHEMERIDES = 8
+"""Length of the array of all ephemerides at one time: position of the Sun (3,) and of the Moon (3,), m, cosine and
+sine of the Earth's rotation angle."""
 
 _CENTURY = 36525.0 * 86400.0
 _ARCSECOND = pi / 648000.0
@@ -97,3 +107,15 @@ def earth_rotation_angle(time: float) -> float:
     """Angle from the inertial x axis to the prime meridian, rad (IERS Conventions 2010, eq. 5.15)."""
     days = (time - _TT_MINUS_UT1) / 86400.0
     return _turn(0.7790572732640 + 0.00273781191135448 * days + (days - floor(days)))
+
+
+@inline
+def look_up(needed: int, time: float, ephemerides: NDArray[np.float64]) -> None:
+    """Fill in the ephemerides `needed` (bits) at a time, s; the others stay as they are."""
+    if needed & SUN:
+        ephemerides[0], ephemerides[1], ephemerides[2] = sun(time)
+    if needed & MOON:
+        ephemerides[3], ephemerides[4], ephemerides[5] = moon(time)
+    if needed & EARTH_ROTATION:
+        angle = earth_rotation_angle(time)
+        ephemerides[6], ephemerides[7] = cos(angle), sin(angle)

@@ -10,7 +10,8 @@ import numpy as np
 from formation_gnc.common import LAST_SECOND, CommonParameters
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.orbit.elements import Elements, elements_from_state, state_from_elements
-from formation_gnc.orbit.forces import Body, Forces
+from formation_gnc.orbit.forces.force import Body
+from formation_gnc.orbit.forces.model import Forces
 from formation_gnc.orbit.frames import (
     inertial_from_relative,
     relative_from_inertial,
@@ -212,7 +213,7 @@ class Plant:
                 self._note(satellite, denied)
         self._forces = np.array(given)
         seconds = self.time / NANOSECONDS
-        self._states = self._propagator.fly(seconds, self._states, self._forces, np.array(masses))
+        self._states = self._propagator.propagate_with_thrust(seconds, self._states, self._forces, np.array(masses))
         self.tick += 1
         self.time += self.parameters.tick_ns
         self.finished = self.tick == self.parameters.ticks

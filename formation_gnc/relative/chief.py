@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import OrbitError
 from formation_gnc.orbit.constants import MU
 from formation_gnc.orbit.elements import (
     Elements,
@@ -106,7 +106,7 @@ class KeplerChief(Chief):
     Table 8.2 has a perigee below it.
 
     Raises:
-        ConfigurationError: for a value that is not finite, a semi-major axis or gravitational parameter
+        OrbitError: for a value that is not finite, a semi-major axis or gravitational parameter
             that is not positive, or an eccentricity outside [0, 1).
     """
 
@@ -122,12 +122,12 @@ class KeplerChief(Chief):
         """Reject what is no ellipse."""
         for name, value in vars(self).items():
             if not math.isfinite(value):
-                raise ConfigurationError(f"{name} is {value}: it must be finite")
+                raise OrbitError(f"{name} is {value}: it must be finite")
         for name in ("semi_major_axis", "mu"):
             if not getattr(self, name) > 0.0:
-                raise ConfigurationError(f"{name} is {getattr(self, name)}: it must be above zero")
+                raise OrbitError(f"{name} is {getattr(self, name)}: it must be above zero")
         if not 0.0 <= self.eccentricity < 1.0:
-            raise ConfigurationError(f"eccentricity is {self.eccentricity}: it must be in [0, 1)")
+            raise OrbitError(f"eccentricity is {self.eccentricity}: it must be in [0, 1)")
 
     @classmethod
     def of(cls, elements: Elements) -> "KeplerChief":

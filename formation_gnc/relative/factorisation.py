@@ -51,11 +51,8 @@ def sdc2(state: Array, chief: ChiefState) -> Array:
     return matrix
 
 
-def sdc1_oblate(state: Array, chief: ChiefState) -> Array:
-    """SDC1 with differential J2: in the place of Joshi (5.34)-(5.55), exact."""
-    matrix = sdc1(state, chief)
-    matrix[..., 3:, :3] += oblateness(state, chief)
-    return matrix
+FACTORISATIONS = {"sdc1": sdc1, "sdc2": sdc2}
+"""Joshi's methods I and II, by name; without J2."""
 
 
 def oblateness(state: Array, chief: ChiefState) -> Array:

@@ -3,10 +3,11 @@
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Self
 
 import numpy as np
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import OrbitError
 from formation_gnc.orbit.constants import EARTH_RADIUS, J2, MU
 from formation_gnc.orbit.elements import Elements, elements_from_state
 from formation_gnc.orbit.frames import hill_transform, hill_transform_inverse
@@ -34,8 +35,10 @@ class GimAlfriendModel(LinearModel):
     Assumes: separation much smaller than the radius; no equatorial chief. Its error is of order J2^2.
 
     Raises:
-        ConfigurationError: for an inclination within a milliradian of 0 or pi.
+        OrbitError: for an inclination within a milliradian of 0 or pi.
     """
+
+    has_j2 = True
 
     elements: Elements
     """Osculating elements of the chief at time zero."""
@@ -43,10 +46,15 @@ class GimAlfriendModel(LinearModel):
     def __post_init__(self) -> None:
         """Reject a chief without a node."""
         if math.sin(self.elements.inclination) < LOWEST_INCLINATION:
-            raise ConfigurationError(
+            raise OrbitError(
                 f"inclination is {self.elements.inclination} rad: the Gim-Alfriend model needs a node, "
                 f"at least {LOWEST_INCLINATION} rad from an equatorial orbit"
             )
+
+    @classmethod
+    def about(cls, chief: Elements) -> Self:
+        """About the chief's orbit under J2."""
+        return cls(chief)
 
     @property
     def chief(self) -> OblateChief:

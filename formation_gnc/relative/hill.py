@@ -2,11 +2,13 @@
 
 import math
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import OrbitError
+from formation_gnc.orbit.elements import Elements
 from formation_gnc.relative.model import NO_THRUST, ON_THE_CHIEF, Array, LinearModel
 
 
@@ -21,6 +23,8 @@ class HarmonicModel(LinearModel):
     """
 
     is_time_invariant = True
+    is_periodic = True
+    has_closed_form = True
 
     @property
     def frequencies(self) -> tuple[float, float, float]:
@@ -36,6 +40,10 @@ class HarmonicModel(LinearModel):
     def longest_step(self) -> float:
         """Unlimited: closed forms throughout."""
         return math.inf
+
+    def phase_rates(self, time: float) -> tuple[float, float]:
+        """In-plane and cross-track frequency, rad/s."""
+        return self.frequencies[1:]
 
     def dynamics(self, time: float = 0.0, state: Array = ON_THE_CHIEF) -> Array:
         """(6, 6) continuous matrix A."""
@@ -81,6 +89,10 @@ class HarmonicModel(LinearModel):
         phi[..., 5, 5] = normal_cosine
         return phi
 
+    def transitions(self, time: float, durations: Array) -> Array:
+        """(N, 6, 6) state transition matrices over durations (N,), s, in one call."""
+        return self.transition(time, durations)
+
     def discretise(self, time: float, tick: ArrayLike, state: Array = ON_THE_CHIEF) -> tuple[Array, Array]:
         """Phi (..., 6, 6) and Gamma (..., 6, 3) over durations (...,) of held acceleration."""
         w, q, p = self.frequencies
@@ -115,7 +127,7 @@ class HillModel(HarmonicModel):
     with its square). Source: Roberts (9); Kremmydas section 1.1.3 with thrust, in its own axes.
 
     Raises:
-        ConfigurationError: for a mean motion that is not positive and finite.
+        OrbitError: for a mean motion that is not positive and finite.
     """
 
     mean_motion: float
@@ -124,7 +136,12 @@ class HillModel(HarmonicModel):
     def __post_init__(self) -> None:
         """Reject a rate that is not one."""
         if not (math.isfinite(self.mean_motion) and self.mean_motion > 0.0):
-            raise ConfigurationError(f"mean_motion is {self.mean_motion} rad/s: it must be positive and finite")
+            raise OrbitError(f"mean_motion is {self.mean_motion} rad/s: it must be positive and finite")
+
+    @classmethod
+    def about(cls, chief: Elements) -> Self:
+        """At the chief's Keplerian mean motion."""
+        return cls(chief.mean_motion)
 
     @property
     def frequencies(self) -> tuple[float, float, float]:

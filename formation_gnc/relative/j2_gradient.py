@@ -2,9 +2,11 @@
 
 import math
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
+from formation_gnc.orbit.elements import Elements
 from formation_gnc.relative.model import ON_THE_CHIEF, Array, LinearModel
 from formation_gnc.relative.schweighart_sedwick import CircularReference, SchweighartSedwickModel
 
@@ -19,7 +21,15 @@ class J2GradientModel(LinearModel):
     10).
     """
 
+    is_periodic = True
+    has_j2 = True
+
     reference: CircularReference
+
+    @classmethod
+    def about(cls, chief: Elements) -> Self:
+        """About the circular reference of the chief's osculating semi-major axis."""
+        return cls(CircularReference.of(chief))
 
     @property
     def period(self) -> float:

@@ -11,11 +11,12 @@ Guidance, navigation and control see only this interface, so that any of them fl
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from formation_gnc.orbit.elements import Elements
 from formation_gnc.orbit.runge_kutta import COUPLING, INSTANT_OF_STAGE, INSTANTS, STAGES, WEIGHTS
 
 Array = NDArray[np.float64]
@@ -46,6 +47,28 @@ class RelativeModel(ABC):
 
     is_time_invariant: ClassVar[bool] = False
     """Whether `dynamics`, `transition` and `discretise` are the same at any time and state."""
+
+    is_periodic: ClassVar[bool] = False
+    """Whether `dynamics` is the same after every `period`; a time-invariant model is."""
+
+    has_closed_form: ClassVar[bool] = False
+    """Whether `transition` is in closed form: a state far ahead then costs as much as the next one."""
+
+    has_j2: ClassVar[bool] = False
+    """Whether the oblateness of the Earth is in the model, averaged or not."""
+
+    is_exact_under_j2: ClassVar[bool] = False
+    """Whether it is the motion of two satellites under point mass and J2 without approximation, so that
+    integrating both in the inertial frame gives the same."""
+
+    @classmethod
+    @abstractmethod
+    def about(cls, chief: Elements) -> Self:
+        """The model about a chief with these osculating elements at time zero.
+
+        Raises:
+            OrbitError: the model does not exist about this chief.
+        """
 
     @property
     @abstractmethod
@@ -126,6 +149,14 @@ class LinearModel(RelativeModel):
     """A model whose right-hand side is `dynamics(t) x + B u`."""
 
     is_linear = True
+
+    def transitions(self, time: float, durations: Array) -> Array:
+        """(N, 6, 6) state transition matrices from one time over durations (N,), s."""
+        return np.array([self.transition(time, float(duration)) for duration in durations])
+
+    def phase_rates(self, time: float) -> tuple[float, float]:
+        """Rates (rad/s) of the in-plane and the cross-track oscillation at a time."""
+        return math.tau / self.period, math.tau / self.period
 
     def derivative(self, time: float, state: Array, acceleration: Array = NO_THRUST) -> Array:
         """(..., 6) rate of change of the relative state (..., 6) under an acceleration (..., 3)."""

@@ -1,19 +1,55 @@
 """The nonlinear equations of relative motion about an eccentric chief, and their Jacobian."""
 
 import math
+from abc import abstractmethod
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
-from formation_gnc.errors import ConfigurationError
-from formation_gnc.relative.chief import ChiefState, KeplerChief, frame_matrix
-from formation_gnc.relative.factorisation import sdc1
+from formation_gnc.errors import OrbitError
+from formation_gnc.orbit.elements import Elements
+from formation_gnc.relative.chief import Chief, ChiefState, KeplerChief, frame_matrix
+from formation_gnc.relative.factorisation import FACTORISATIONS
 from formation_gnc.relative.kernels import motion
 from formation_gnc.relative.model import INPUT, NO_THRUST, ON_THE_CHIEF, Array, RelativeModel
 
 
+class FactorisedModel(RelativeModel):
+    """Nonlinear equations of motion with a state-dependent factorisation x' = A(x) x + B u about a chief."""
+
+    is_linear = False
+
+    chief: Chief
+
+    @property
+    def period(self) -> float:
+        """Period of the chief's argument of latitude, s."""
+        return self.chief.period
+
+    @property
+    def longest_step(self) -> float:
+        """Longest integration step, s, set by the chief's motion at its perigee."""
+        return self.chief.longest_step
+
+    @abstractmethod
+    def factorised(self, state: Array, chief: ChiefState, method: str = "sdc1") -> Array:
+        """(..., 6, 6) matrix A(x) at states (..., 6), with one state of the chief or one each.
+
+        Args:
+            state: relative states, Hill frame, m and m/s.
+            chief: the chief at the same instants.
+            method: of `FACTORISATIONS`.
+        """
+
+    def derivative(self, time: float, state: Array, acceleration: Array = NO_THRUST) -> Array:
+        """(..., 6) right-hand side, by the factorisation SDC1, which cancels no digits."""
+        free: Array = (self.factorised(state, self.chief.at(time)) @ np.asarray(state)[..., None])[..., 0]
+        return free + np.asarray(acceleration) @ INPUT.T
+
+
 @dataclass(frozen=True)
-class NonlinearModel(RelativeModel):
+class NonlinearModel(FactorisedModel):
     """Exact relative motion of two satellites of point-mass gravity, at any separation and eccentricity.
 
     Assumes: spherical Earth, a chief that does not manoeuvre. Source: Joshi (3.22)-(3.26) and (6.27)-(6.40),
@@ -22,22 +58,14 @@ class NonlinearModel(RelativeModel):
 
     chief: KeplerChief
 
-    is_linear = False
+    @classmethod
+    def about(cls, chief: Elements) -> Self:
+        """About the chief's osculating ellipse."""
+        return cls(KeplerChief.of(chief))
 
-    @property
-    def period(self) -> float:
-        """Period of the chief, s."""
-        return self.chief.period
-
-    @property
-    def longest_step(self) -> float:
-        """Longest integration step, s, set by the chief's motion at its perigee."""
-        return self.chief.longest_step
-
-    def derivative(self, time: float, state: Array, acceleration: Array = NO_THRUST) -> Array:
-        """(..., 6) right-hand side of Joshi (3.22), by the factorisation SDC1, which cancels no digits."""
-        free: Array = (sdc1(state, self.chief.at(time)) @ np.asarray(state)[..., None])[..., 0]
-        return free + np.asarray(acceleration) @ INPUT.T
+    def factorised(self, state: Array, chief: ChiefState, method: str = "sdc1") -> Array:
+        """(..., 6, 6) matrix A(x) of point-mass gravity."""
+        return FACTORISATIONS[method](state, chief)
 
     def dynamics(self, time: float, state: Array = ON_THE_CHIEF) -> Array:
         """(6, 6) Jacobian at the state: Joshi (6.27)-(6.40)."""
@@ -51,7 +79,7 @@ class NonlinearModel(RelativeModel):
         """(6,) state whose along-track rate gives the deputy the chief's energy: both then take one period.
 
         Raises:
-            ConfigurationError: if the other rates alone already exceed that energy.
+            OrbitError: if the other rates alone already exceed that energy.
         """
         chief = self.chief.at(time)
         x, y, z, vx, _, vz = (float(value) for value in state)
@@ -60,7 +88,7 @@ class NonlinearModel(RelativeModel):
         square = chief.mu * (2.0 / distance - 1.0 / self.chief.semi_major_axis)
         square -= (radial_rate + vx - chief.angular_rate * y) ** 2 + vz**2
         if square < 0.0:
-            raise ConfigurationError(
+            raise OrbitError(
                 f"relative state {[x, y, z, vx, vz]}: no along-track rate gives it the energy of the chief"
             )
         result = np.array(state, dtype=np.float64)

@@ -2,22 +2,23 @@
 
 import math
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
 from formation_gnc.orbit.constants import EARTH_RADIUS, J2, MU
-from formation_gnc.orbit.elements import elements_from_state
+from formation_gnc.orbit.elements import Elements, elements_from_state
 from formation_gnc.orbit.frames import hill_rate, inertial_from_relative
 from formation_gnc.orbit.mean import mean_state, secular_rates
 from formation_gnc.relative.chief import Chief, ChiefState, OblateChief
-from formation_gnc.relative.factorisation import sdc1_oblate
+from formation_gnc.relative.factorisation import FACTORISATIONS, oblateness
 from formation_gnc.relative.kernels import motion
-from formation_gnc.relative.model import INPUT, NO_THRUST, ON_THE_CHIEF, Array, RelativeModel
-from formation_gnc.relative.nonlinear import jacobian
+from formation_gnc.relative.model import NO_THRUST, ON_THE_CHIEF, Array
+from formation_gnc.relative.nonlinear import FactorisedModel, jacobian
 
 
 @dataclass(frozen=True)
-class OblateModel(RelativeModel):
+class OblateModel(FactorisedModel):
     """Relative motion of two satellites under point-mass gravity and J2.
 
     Exact at any separation and eccentricity with an `OblateChief`. With a `KeplerChief` it is Joshi's model:
@@ -27,24 +28,21 @@ class OblateModel(RelativeModel):
     corrections of docs/theory/errata.md.
     """
 
+    has_j2 = True
+    is_exact_under_j2 = True
+
     chief: Chief
 
-    is_linear = False
+    @classmethod
+    def about(cls, chief: Elements) -> Self:
+        """About the chief's orbit under J2."""
+        return cls(OblateChief(chief))
 
-    @property
-    def period(self) -> float:
-        """Period of the chief's argument of latitude, s."""
-        return self.chief.period
-
-    @property
-    def longest_step(self) -> float:
-        """Longest integration step, s, set by the chief's motion at its perigee."""
-        return self.chief.longest_step
-
-    def derivative(self, time: float, state: Array, acceleration: Array = NO_THRUST) -> Array:
-        """(..., 6) right-hand side, by the factorisation SDC1 with J2, which cancels no digits."""
-        free: Array = (sdc1_oblate(state, self.chief.at(time)) @ np.asarray(state)[..., None])[..., 0]
-        return free + np.asarray(acceleration) @ INPUT.T
+    def factorised(self, state: Array, chief: ChiefState, method: str = "sdc1") -> Array:
+        """(..., 6, 6) matrix A(x), with the differential J2 as a factorisation of its own."""
+        matrix = FACTORISATIONS[method](state, chief)
+        matrix[..., 3:, :3] += oblateness(state, chief)
+        return matrix
 
     def dynamics(self, time: float, state: Array = ON_THE_CHIEF) -> Array:
         """(6, 6) Jacobian at the state: what Joshi (6.27)-(6.46) are meant to be."""

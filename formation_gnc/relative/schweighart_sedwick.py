@@ -2,10 +2,11 @@
 
 import math
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import OrbitError
 from formation_gnc.orbit.constants import EARTH_RADIUS, J2, MU
 from formation_gnc.orbit.elements import Elements
 from formation_gnc.relative.hill import HarmonicModel
@@ -17,7 +18,7 @@ class CircularReference:
     """The circular orbit about which J2 is linearised; its rate and node move as J2 moves them on average.
 
     Raises:
-        ConfigurationError: for a radius below the Earth's surface, or values that are not finite.
+        OrbitError: for a radius below the Earth's surface, or values that are not finite.
     """
 
     radius: float
@@ -31,9 +32,9 @@ class CircularReference:
         """Reject what is no orbit."""
         for name, value in vars(self).items():
             if not math.isfinite(value):
-                raise ConfigurationError(f"{name} is {value}: it must be finite")
+                raise OrbitError(f"{name} is {value}: it must be finite")
         if not self.radius > EARTH_RADIUS:
-            raise ConfigurationError(f"radius is {self.radius} m: it must be above the Earth's, {EARTH_RADIUS} m")
+            raise OrbitError(f"radius is {self.radius} m: it must be above the Earth's, {EARTH_RADIUS} m")
 
     @classmethod
     def of(cls, elements: Elements) -> "CircularReference":
@@ -85,7 +86,14 @@ class SchweighartSedwickModel(HarmonicModel):
     different inclination turn about the wrong axis (see `SchweighartSedwickNodalModel`).
     """
 
+    has_j2 = True
+
     reference: CircularReference
+
+    @classmethod
+    def about(cls, chief: Elements) -> Self:
+        """About the circular reference of the chief's osculating semi-major axis."""
+        return cls(CircularReference.of(chief))
 
     @property
     def frequencies(self) -> tuple[float, float, float]:
@@ -127,7 +135,16 @@ class SchweighartSedwickNodalModel(LinearModel):
     initial state and undefined for a zero one, become a linear time-varying equation without singularity.
     """
 
+    is_periodic = True
+    has_closed_form = True
+    has_j2 = True
+
     reference: CircularReference
+
+    @classmethod
+    def about(cls, chief: Elements) -> Self:
+        """About the circular reference of the chief's osculating semi-major axis."""
+        return cls(CircularReference.of(chief))
 
     @property
     def period(self) -> float:
@@ -143,6 +160,10 @@ class SchweighartSedwickNodalModel(LinearModel):
     def in_plane(self) -> SchweighartSedwickModel:
         """The model that holds in the plane."""
         return SchweighartSedwickModel(self.reference)
+
+    def phase_rates(self, time: float) -> tuple[float, float]:
+        """In-plane frequency, and rate of the argument of latitude, rad/s."""
+        return self.in_plane.frequencies[1], self.reference.nodal_rate
 
     def dynamics(self, time: float, state: Array = ON_THE_CHIEF) -> Array:
         """(6, 6) continuous matrix A(t)."""

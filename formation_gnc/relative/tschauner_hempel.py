@@ -2,9 +2,11 @@
 
 import math
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
+from formation_gnc.orbit.elements import Elements
 from formation_gnc.relative.chief import KeplerChief
 from formation_gnc.relative.model import ON_THE_CHIEF, Array, LinearModel
 from formation_gnc.relative.nonlinear import jacobian
@@ -19,7 +21,15 @@ class TschaunerHempelModel(LinearModel):
     transition matrix is Yamanaka and Ankersen's (2002), in the axes used here.
     """
 
+    is_periodic = True
+    has_closed_form = True
+
     chief: KeplerChief
+
+    @classmethod
+    def about(cls, chief: Elements) -> Self:
+        """About the chief's osculating ellipse."""
+        return cls(KeplerChief.of(chief))
 
     @property
     def period(self) -> float:
@@ -30,6 +40,11 @@ class TschaunerHempelModel(LinearModel):
     def longest_step(self) -> float:
         """Longest integration step, s, set by the chief's motion at its perigee."""
         return self.chief.longest_step
+
+    def phase_rates(self, time: float) -> tuple[float, float]:
+        """Rate of the chief's true anomaly, rad/s, for both."""
+        rate = self.chief.at(time).angular_rate
+        return rate, rate
 
     def dynamics(self, time: float, state: Array = ON_THE_CHIEF) -> Array:
         """(6, 6) continuous matrix A(t): Neokleous (1.11)."""

@@ -85,7 +85,7 @@ def simulate_measurements(
         )
         # White acceleration held over a tick: it adds what the process noise adds.
         thrust = force @ hill_rotation(chief) / mass + jitter * random.standard_normal(3)
-        states = propagator.advance(tick * parameters.tick, states, np.array([_AT_REST, thrust]))
+        states = propagator.propagate(tick * parameters.tick, states, np.array([_AT_REST, thrust]))
 
 
 def navigator(parameters: NavigationParameters) -> NavigationFilter:

@@ -11,8 +11,7 @@ import rclpy
 from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, RMWError, UnknownROSArgsError
 from rclpy.signals import SignalHandlerOptions
 
-from formation_gnc.errors import ConfigurationError
-from formation_gnc.orbit.propagation import ImpactError
+from formation_gnc.errors import ConfigurationError, ImpactError
 
 REJECTED_BY_ROS = (RCLInvalidROSArgsError, UnknownROSArgsError, RCLError, RMWError)
 """What rclpy raises for arguments, parameter files and middleware it cannot use."""

@@ -72,6 +72,15 @@ def test_radial_amplitude_about_an_eccentric_chief_is_the_formations(
     assert np.abs(x).max() <= np.hypot(start[0], start[3] / n) * (1.0 + 1e-9) + 1e-9
 
 
+@pytest.mark.parametrize("model", TARGET_MODELS)
+@given(st.floats(0.0, 3e4), st.floats(0.0, 0.3))
+def test_satellite_on_its_target_coasts_along_the_path(model: str, time: float, e: float) -> None:
+    target = path(model, "projected_circular_orbit", common(e), slot=1)
+    ahead = np.array([0.0, 700.0, 5000.0])
+    coasted = target.coast(target.states(np.array([time])), time, ahead)[:, 0]
+    assert coasted == pytest.approx(target.states(time + ahead), abs=1e-5)
+
+
 def test_drifting_formation_drifts_in_every_model() -> None:
     about = common()
     for model in TARGET_MODELS:

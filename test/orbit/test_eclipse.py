@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from formation_gnc.errors import ImpactError
 from formation_gnc.orbit.constants import EARTH_RADIUS, MU
 from formation_gnc.orbit.eclipse import eclipses
 from formation_gnc.orbit.elements import Elements, state_from_elements
-from formation_gnc.orbit.propagation import ImpactError, Propagator
+from formation_gnc.orbit.propagation import Propagator
 
 EQUINOX = (9210 - 0.5) * 86400.0  # s since J2000.0: 20 March 2025, the Sun on the x axis
 RADIUS = 7078136.3
@@ -45,7 +46,7 @@ def test_begin_and_end_are_where_the_plant_sees_them(revolution: float) -> None:
     propagator, flown, dark = Propagator(tick, epoch=EQUINOX), state, []
     for k in range(int(1.2 * revolution)):
         dark.append(propagator.illumination(k * tick, flown) < 1.0)
-        flown = propagator.advance(k * tick, flown[None], np.zeros((1, 3)))[0]
+        flown = propagator.propagate(k * tick, flown[None], np.zeros((1, 3)))[0]
     changes = 1.0 + np.flatnonzero(np.diff(dark))
     bounds = nights.ravel()[(nights.ravel() > 0.0) & (nights.ravel() < len(dark) - 1)]
     assert len(changes) == len(bounds) >= 2

@@ -8,13 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import assoc_legendre_p_all, eval_legendre
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import ConfigurationError, ImpactError
 from formation_gnc.orbit.constants import EARTH_RADIUS, EARTH_ROTATION_RATE, J2, MU, NORMALISED_ZONALS
 from formation_gnc.orbit.elements import Elements, elements_from_state, state_from_elements
-from formation_gnc.orbit.forces import Body, Forces, drag, harmonics, radiation, third_body, zonal
+from formation_gnc.orbit.forces import drag, harmonics, radiation, third_body, zonal
 from formation_gnc.orbit.forces.egm2008 import MAXIMUM_DEGREE, NORMALISED_C, NORMALISED_S
+from formation_gnc.orbit.forces.force import Body
+from formation_gnc.orbit.forces.model import Forces
 from formation_gnc.orbit.frames import hill_rotation
-from formation_gnc.orbit.propagation import ImpactError, Propagator
+from formation_gnc.orbit.propagation import Propagator
 from formation_gnc.orbit.sky import ASTRONOMICAL_UNIT, moon, sun
 
 DAY = 86400.0
@@ -163,7 +165,7 @@ def fly(elements, duration, tick, forces, body=None, epoch=0.0, substeps=1):
     propagator = Propagator(tick, substeps, forces, (body or Body(),), epoch)
     states, thrust = state_from_elements(elements)[None], np.zeros((1, 3))
     for k in range(round(duration / tick)):
-        states = propagator.advance(k * tick, states, thrust)
+        states = propagator.propagate(k * tick, states, thrust)
     return states[0]
 
 
@@ -280,10 +282,10 @@ def test_drag_brakes_a_circular_orbit_at_the_analytic_rate():
 def test_present_masses_take_the_place_of_the_bodies():
     start = state_from_elements(Elements(EARTH_RADIUS + 300e3, 0.0, 0.0, 0.0, 0.0, 0.0))[None]
     forces, thrust = Forces(drag=True), np.zeros((1, 3))
-    light = Propagator(10.0, 1, forces, (Body(mass=50.0),)).advance(0.0, start, thrust)
+    light = Propagator(10.0, 1, forces, (Body(mass=50.0),)).propagate(0.0, start, thrust)
     heavy = Propagator(10.0, 1, forces, (Body(mass=100.0),))
-    assert np.array_equal(heavy.advance(0.0, start, thrust, np.array([50.0])), light)
-    assert not np.array_equal(heavy.advance(0.0, start, thrust), light)
+    assert np.array_equal(heavy.propagate(0.0, start, thrust, np.array([50.0])), light)
+    assert not np.array_equal(heavy.propagate(0.0, start, thrust), light)
 
 
 @pytest.mark.parametrize("switch", ["sun", "moon", "radiation_pressure", "drag"])
@@ -335,12 +337,12 @@ def test_a_force_without_its_body_is_rejected():
     with pytest.raises(ConfigurationError, match="bodies is empty"):
         Propagator(1.0, forces=Forces(drag=True))
     with pytest.raises(ConfigurationError, match="2 bodies for 1 satellites"):
-        Propagator(1.0, bodies=(Body(), Body())).advance(0.0, np.ones((1, 6)), np.zeros((1, 3)))
+        Propagator(1.0, bodies=(Body(), Body())).propagate(0.0, np.ones((1, 6)), np.zeros((1, 3)))
 
 
 def test_an_impact_is_reported_not_flown():
     state = np.array([[EARTH_RADIUS + 1e3, 0.0, 0.0, -500.0, 7000.0, 0.0]])
     with pytest.raises(ImpactError, match="satellite 0 is below the Earth's surface at 10 s"):
-        Propagator(10.0).advance(0.0, state, np.zeros((1, 3)))
+        Propagator(10.0).propagate(0.0, state, np.zeros((1, 3)))
     with pytest.raises(ImpactError, match="nan"):
-        Propagator(10.0).advance(0.0, state * np.nan, np.zeros((1, 3)))
+        Propagator(10.0).propagate(0.0, state * np.nan, np.zeros((1, 3)))

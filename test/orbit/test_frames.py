@@ -87,8 +87,8 @@ def test_under_j2_the_derivative_differs_by_the_tilt_of_the_orbit_plane():
     relative = np.array([300.0, -500.0, 400.0, 0.1, -0.2, 0.3])
     states = np.array([CHIEF, inertial_from_relative(CHIEF, relative)])
     step = 0.5
-    after = Propagator(step).advance(0.0, states, np.zeros((2, 3)))
-    before = Propagator(step).advance(0.0, states * [1, 1, 1, -1, -1, -1], np.zeros((2, 3)))
+    after = Propagator(step).propagate(0.0, states, np.zeros((2, 3)))
+    before = Propagator(step).propagate(0.0, states * [1, 1, 1, -1, -1, -1], np.zeros((2, 3)))
     before = before * [1, 1, 1, -1, -1, -1]  # time reversed: gravity is the same both ways
     derivative = (relative_from_inertial(*after)[:3] - relative_from_inertial(*before)[:3]) / (2 * step)
     tilt = hill_angular_velocity(CHIEF, acceleration(CHIEF[:3])) * [1, 0, 0]

@@ -33,7 +33,7 @@ def fly(elements, orbits, samples):
     propagator = Propagator(step, substeps=max(1, round(800 / samples)))
     states = [state_from_elements(elements)]
     for _ in range(orbits * samples):
-        states.append(propagator.advance(0.0, states[-1][None], np.zeros((1, 3)))[0])
+        states.append(propagator.propagate(0.0, states[-1][None], np.zeros((1, 3)))[0])
     return np.arange(len(states)) * step, states
 
 
@@ -147,7 +147,7 @@ def test_equal_mean_semi_major_axes_keep_two_satellites_together():
         states = np.array([state_from_elements(chief), state_from_elements(deputy)])
         separations = []
         for k in range(1455):  # 15 orbits
-            states = propagator.advance(60.0 * k, states, np.zeros((2, 3)))
+            states = propagator.propagate(60.0 * k, states, np.zeros((2, 3)))
             separations.append(np.linalg.norm(states[1, :3] - states[0, :3]))
         return abs(np.mean(separations[-97:]) - np.mean(separations[:97]))
 

@@ -18,7 +18,7 @@ ECCENTRIC = Elements(2e7, 0.6, np.radians(50.0), 0.3, 0.2, 0.1)
 def fly(elements, ticks, tick, thrust=(0.0, 0.0, 0.0)):
     propagator, states = Propagator(tick), state_from_elements(elements)[None]
     for k in range(ticks):
-        states = propagator.advance(k * tick, states, np.array([thrust]))
+        states = propagator.propagate(k * tick, states, np.array([thrust]))
     return states[0]
 
 
@@ -63,7 +63,7 @@ def test_the_method_is_of_order_eight(elements, coarse):
 
 def test_substeps_are_steps():
     state = state_from_elements(ECCENTRIC)[None]
-    whole = Propagator(60.0, substeps=6).advance(0.0, state, np.zeros((1, 3)))
+    whole = Propagator(60.0, substeps=6).propagate(0.0, state, np.zeros((1, 3)))
     assert whole[0] == pytest.approx(fly(ECCENTRIC, 6, 10.0), abs=0.0)
 
 
@@ -87,9 +87,9 @@ def test_satellites_do_not_feel_one_another():
     together = np.array([state_from_elements(LEO), state_from_elements(ECCENTRIC)])
     thrust = np.array([[0.0, 1e-4, 0.0], [1e-4, 0.0, 0.0]])
     propagator = Propagator(30.0)
-    both = propagator.advance(0.0, together, thrust)
+    both = propagator.propagate(0.0, together, thrust)
     for k in range(2):
-        alone = propagator.advance(0.0, together[k : k + 1], thrust[k : k + 1])
+        alone = propagator.propagate(0.0, together[k : k + 1], thrust[k : k + 1])
         assert np.array_equal(alone[0], both[k])
 
 
@@ -98,8 +98,8 @@ def test_forces_along_the_hill_axes_move_as_the_accelerations_that_they_are():
     forces, masses = np.array([[0.0, 0.0, 0.0], [0.01, -0.02, 0.03]]), np.array([100.0, 7.0])
     propagator, before = Propagator(30.0), states.copy()
     accelerations = inertial_acceleration(states[0], forces, masses)
-    moved = propagator.fly(0.0, states, forces, masses)
-    assert np.array_equal(moved, propagator.advance(0.0, states, accelerations, masses))
+    moved = propagator.propagate_with_thrust(0.0, states, forces, masses)
+    assert np.array_equal(moved, propagator.propagate(0.0, states, accelerations, masses))
     assert np.array_equal(states, before)
 
 
@@ -107,9 +107,9 @@ def test_advance_leaves_its_arguments_alone_and_repeats_to_the_bit():
     states = state_from_elements(LEO)[None]
     before = states.copy()
     propagator = Propagator(1.0)
-    first = propagator.advance(0.0, states, np.zeros((1, 3)))
+    first = propagator.propagate(0.0, states, np.zeros((1, 3)))
     assert np.array_equal(states, before)
-    assert np.array_equal(first, propagator.advance(0.0, states, np.zeros((1, 3))))
+    assert np.array_equal(first, propagator.propagate(0.0, states, np.zeros((1, 3))))
 
 
 def test_gradient_is_the_derivative_of_acceleration():
@@ -126,7 +126,7 @@ def test_gradient_is_the_derivative_of_acceleration():
 def test_transition_matrix_is_the_derivative_of_the_state_and_symplectic():
     state, thrust = state_from_elements(LEO), np.array([1e-4, 0.0, -1e-4])
     end, transition = advance_with_transition(state, thrust, 60.0, 4)
-    assert end == pytest.approx(Propagator(60.0, substeps=4).advance(0.0, state[None], thrust[None])[0], abs=0.0)
+    assert end == pytest.approx(Propagator(60.0, substeps=4).propagate(0.0, state[None], thrust[None])[0], abs=0.0)
     for column, step in enumerate([1.0] * 3 + [1e-3] * 3):
         change = step * np.eye(6)[column]
         ahead, _ = advance_with_transition(state + change, thrust, 60.0, 4)

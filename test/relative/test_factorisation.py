@@ -12,9 +12,11 @@ from formation_gnc.orbit.elements import Elements
 from formation_gnc.orbit.frames import hill_rotation
 from formation_gnc.orbit.gravity import acceleration as gravity
 from formation_gnc.relative.chief import ChiefState, KeplerChief, OblateChief
-from formation_gnc.relative.factorisation import oblateness, sdc1, sdc1_oblate, sdc2
+from formation_gnc.relative.factorisation import oblateness, sdc1, sdc2
 from formation_gnc.relative.nonlinear import jacobian
-from formation_gnc.relative.oblate import oblate_gradient
+from formation_gnc.relative.oblate import OblateModel, oblate_gradient
+
+sdc1_oblate = OblateModel(KeplerChief(8e6)).factorised
 
 chiefs = st.builds(
     KeplerChief,

@@ -10,28 +10,16 @@ from formation_gnc.orbit.elements import Elements
 from formation_gnc.relative.chief import KeplerChief, OblateChief
 from formation_gnc.relative.gim_alfriend import GimAlfriendModel
 from formation_gnc.relative.hill import HillModel
-from formation_gnc.relative.j2_gradient import J2GradientModel
 from formation_gnc.relative.model import INPUT, RelativeModel, integrate
 from formation_gnc.relative.nonlinear import NonlinearModel
 from formation_gnc.relative.oblate import OblateModel
-from formation_gnc.relative.schweighart_sedwick import (
-    CircularReference,
-    SchweighartSedwickModel,
-    SchweighartSedwickNodalModel,
-)
+from formation_gnc.relative.registry import MODELS as REGISTRY
+from formation_gnc.relative.schweighart_sedwick import SchweighartSedwickNodalModel
 from formation_gnc.relative.tschauner_hempel import TschaunerHempelModel
 
 ELEMENTS = Elements(7.5e6, 0.05, 1.0, 0.3, 0.4, 0.5)
-REFERENCE = CircularReference(7.2e6, 1.0, 0.3)
 MODELS = [
-    HillModel(1.05e-3),
-    SchweighartSedwickModel(REFERENCE),
-    SchweighartSedwickNodalModel(REFERENCE),
-    J2GradientModel(REFERENCE),
-    TschaunerHempelModel(KeplerChief.of(ELEMENTS)),
-    GimAlfriendModel(ELEMENTS),
-    NonlinearModel(KeplerChief.of(ELEMENTS)),
-    OblateModel(OblateChief(ELEMENTS)),
+    *(model.about(ELEMENTS) for model in dict.fromkeys(REGISTRY.values())),
     OblateModel(KeplerChief.of(ELEMENTS)),
 ]
 STATE = np.array([1e3, 2e3, -5e2, 1.0, -2.0, 0.5])

@@ -9,7 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
-from formation_gnc.control.finite_horizon import PLAN_MODELS
+from formation_gnc.control.models import PLAN_MODELS
 from formation_gnc.control.plan import Task
 from formation_gnc.control.static_programming import StaticPlan, gmpsp, lqr_guess, mpsp
 from formation_gnc.orbit.elements import Elements

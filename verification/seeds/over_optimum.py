@@ -12,7 +12,7 @@ import numpy as np
 from formation_gnc.common import CommonParameters
 from formation_gnc.common import Orbit as Chief
 from formation_gnc.control.controller import Command, Controller, Vehicle
-from formation_gnc.control.finite_horizon import PLAN_MODELS
+from formation_gnc.control.models import PLAN_MODELS
 from formation_gnc.control.registry import ALGORITHMS, FINITE_HORIZONS
 from formation_gnc.guidance.relative_orbit import RelativeOrbit, RelativeOrbitParameters
 from formation_gnc.orbit.constants import MU

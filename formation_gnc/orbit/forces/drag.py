@@ -5,7 +5,9 @@ from math import exp, sqrt
 import numpy as np
 
 from formation_gnc.orbit.constants import EARTH_RADIUS, EARTH_ROTATION_RATE
+from formation_gnc.orbit.forces.force import Floats, Force, Vector3
 from formation_gnc.orbit.jit import inline
+from formation_gnc.parameters import parameter
 
 FLATTENING = 1.0 / 298.257223563
 """Of the surface from which altitude is counted (WGS 84)."""
@@ -64,10 +66,20 @@ def density(x: float, y: float, z: float) -> float:
 
 
 @inline
-def acceleration(
-    area_to_mass: float, x: float, y: float, z: float, vx: float, vy: float, vz: float
-) -> tuple[float, float, float]:
+def acceleration(area_to_mass: float, x: float, y: float, z: float, vx: float, vy: float, vz: float) -> Vector3:
     """Acceleration by drag, m/s^2; `area_to_mass` is drag coefficient times area over mass, m^2/kg."""
     ux, uy, uz = vx + EARTH_ROTATION_RATE * y, vy - EARTH_ROTATION_RATE * x, vz
     brake = -0.5 * density(x, y, z) * area_to_mass * sqrt(ux * ux + uy * uy + uz * uz)
     return brake * ux, brake * uy, brake * uz
+
+
+@inline
+def _on_satellite(settings: Floats, coefficient: float, ephemerides: Floats, state: Floats) -> Vector3:
+    return acceleration(coefficient, *state)
+
+
+DRAG = Force(
+    {"drag": parameter(False, doc="Drag in an exponential atmosphere that turns with the Earth")},
+    _on_satellite,
+    coefficient=lambda body: body.area * body.drag_coefficient,
+)

@@ -2,9 +2,12 @@
 
 from math import acos, asin, pi, sqrt
 
+from formation_gnc.orbit import sky
 from formation_gnc.orbit.constants import EARTH_RADIUS
+from formation_gnc.orbit.forces.force import Floats, Force, Vector3
 from formation_gnc.orbit.jit import inline
 from formation_gnc.orbit.sky import ASTRONOMICAL_UNIT
+from formation_gnc.parameters import parameter
 
 SOLAR_PRESSURE = 1361.0 / 299792458.0
 """Pressure of sunlight on an absorbing surface at one astronomical unit, N/m^2 (irradiance of IAU 2015)."""
@@ -44,12 +47,23 @@ def illumination(sx: float, sy: float, sz: float, x: float, y: float, z: float) 
 
 
 @inline
-def acceleration(
-    area_to_mass: float, sx: float, sy: float, sz: float, x: float, y: float, z: float
-) -> tuple[float, float, float]:
+def acceleration(area_to_mass: float, sx: float, sy: float, sz: float, x: float, y: float, z: float) -> Vector3:
     """Acceleration by sunlight, m/s^2; `area_to_mass` is reflectivity times area over mass, m^2/kg."""
     light = illumination(sx, sy, sz, x, y, z)
     dx, dy, dz = x - sx, y - sy, z - sz
     square = dx * dx + dy * dy + dz * dz
     push = light * SOLAR_PRESSURE * area_to_mass * ASTRONOMICAL_UNIT**2 / (square * sqrt(square))
     return push * dx, push * dy, push * dz
+
+
+@inline
+def _on_satellite(settings: Floats, coefficient: float, ephemerides: Floats, state: Floats) -> Vector3:
+    return acceleration(coefficient, ephemerides[0], ephemerides[1], ephemerides[2], *state[:3])
+
+
+RADIATION_PRESSURE = Force(
+    {"radiation_pressure": parameter(False, doc="Solar radiation pressure, less the Earth's shadow")},
+    _on_satellite,
+    sky.SUN,
+    lambda body: body.area * body.reflectivity,
+)

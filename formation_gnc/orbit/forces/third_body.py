@@ -1,6 +1,9 @@
 """Sun and Moon as point masses, less what they do to the Earth itself."""
 
+from formation_gnc.orbit import sky
+from formation_gnc.orbit.forces.force import Floats, Force, Vector3
 from formation_gnc.orbit.jit import inline
+from formation_gnc.parameters import parameter
 
 MU_SUN = 1.32712440041e20
 """Gravitational parameter of the Sun, m^3/s^2 (JPL DE440)."""
@@ -10,11 +13,23 @@ MU_MOON = 4.902800118e12
 
 
 @inline
-def acceleration(
-    mu: float, bx: float, by: float, bz: float, x: float, y: float, z: float
-) -> tuple[float, float, float]:
+def acceleration(mu: float, bx: float, by: float, bz: float, x: float, y: float, z: float) -> Vector3:
     """Acceleration at (x, y, z) by a body at (bx, by, bz), geocentric, m/s^2 (Montenbruck and Gill 3.37)."""
     dx, dy, dz = bx - x, by - y, bz - z
     near = mu / (dx * dx + dy * dy + dz * dz) ** 1.5
     far = mu / (bx * bx + by * by + bz * bz) ** 1.5
     return near * dx - far * bx, near * dy - far * by, near * dz - far * bz
+
+
+@inline
+def _of_sun(settings: Floats, coefficient: float, ephemerides: Floats, state: Floats) -> Vector3:
+    return acceleration(MU_SUN, ephemerides[0], ephemerides[1], ephemerides[2], *state[:3])
+
+
+@inline
+def _of_moon(settings: Floats, coefficient: float, ephemerides: Floats, state: Floats) -> Vector3:
+    return acceleration(MU_MOON, ephemerides[3], ephemerides[4], ephemerides[5], *state[:3])
+
+
+SUN_ATTRACTION = Force({"sun": parameter(False, doc="Attraction of the Sun")}, _of_sun, sky.SUN)
+MOON_ATTRACTION = Force({"moon": parameter(False, doc="Attraction of the Moon")}, _of_moon, sky.MOON)

@@ -1,0 +1,145 @@
+"""The force model: the Earth's gravity field and the registered forces, compiled into one sum."""
+
+import inspect
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.orbit.forces import harmonics, zonal
+from formation_gnc.orbit.forces.egm2008 import MAXIMUM_DEGREE
+from formation_gnc.orbit.forces.force import Body, Floats, Force, Vector3
+from formation_gnc.orbit.forces.registry import FORCES
+from formation_gnc.orbit.jit import inline
+from formation_gnc.orbit.sky import EARTH_ROTATION
+from formation_gnc.parameters import leaves, parameter
+
+Array = NDArray[np.float64]
+Sum = Callable[..., Vector3]
+
+
+_GRAVITY_SETTINGS = 2
+"""Settings of the gravity field, which come first."""
+
+
+def _with_registered_parameters[T](schema: type[T]) -> type[T]:
+    """Make the class a frozen dataclass whose fields are its own and the parameters of `FORCES`."""
+    for force in FORCES:
+        for name, field in force.parameters.items():
+            if name in schema.__annotations__:
+                raise ValueError(f"parameter {name} of a force: another one has this name; each must be unique")
+            schema.__annotations__[name] = type(field.default)
+            setattr(schema, name, field)
+    return dataclass(frozen=True)(schema)
+
+
+@_with_registered_parameters
+class Forces:
+    """Which forces act besides thrust: the Earth's gravity field, and the registered ones."""
+
+    zonal_degree: int = parameter(
+        2,
+        minimum=0,
+        maximum=6,
+        doc="Highest zonal harmonic of the Earth: 2 is J2; below 2, none",
+    )
+    harmonics_degree: int = parameter(
+        0,
+        minimum=0,
+        maximum=MAXIMUM_DEGREE,
+        doc="Degree and order of EGM2008 in place of the zonal harmonics; 0 leaves them in force",
+    )
+
+    def settings(self) -> Array:
+        """The fields in order, as the compiled sum takes them.
+
+        Raises:
+            ConfigurationError: a value out of its range.
+        """
+        return np.array([float(leaf.check(getattr(self, leaf.name))) for leaf in leaves(type(self), {})])
+
+    def ephemerides(self) -> int:
+        """What the forces in use need of the sky, as `formation_gnc.orbit.sky.look_up` takes it."""
+        needed = EARTH_ROTATION if self.harmonics_degree else 0
+        for force in FORCES:
+            needed |= force.ephemerides if self._is_on(force) else 0
+        return needed
+
+    def coefficients(self, bodies: Sequence[Body]) -> Array:
+        """(N, len(FORCES)) property of each body that each force is proportional to.
+
+        Raises:
+            ConfigurationError: no bodies for a force in use that depends on them, or a value of a body out of
+                its range.
+        """
+        for force in FORCES:
+            if force.coefficient is not None and self._is_on(force) and not bodies:
+                raise ConfigurationError(f"bodies is empty: {_switch(force)} needs one for each satellite")
+        for body in bodies:
+            for leaf in leaves(Body, {}):
+                leaf.check(getattr(body, leaf.name))
+        return np.array(
+            [[force.coefficient(body) if force.coefficient else 0.0 for force in FORCES] for body in bodies]
+        ).reshape(-1, len(FORCES))
+
+    def _is_on(self, force: Force) -> bool:
+        return bool(getattr(self, _switch(force)))
+
+
+def _switch(force: Force) -> str:
+    return next(iter(force.parameters))
+
+
+@inline
+def _gravity_field(settings: Floats, coefficients: Floats, ephemerides: Floats, state: Floats) -> Vector3:
+    if settings[1] >= 2.0:
+        return harmonics.acceleration(int(settings[1]), ephemerides[6], ephemerides[7], *state[:3])
+    return zonal.acceleration(int(settings[0]), *state[:3])
+
+
+def _add(before: Sum, force: Force, column: int, first: int) -> Sum:
+    """The sum `before` plus a force, whose coefficient is at `column` and whose settings begin at `first`."""
+    of_force, last = force.acceleration, first + len(force.parameters)
+
+    @inline
+    def total(settings: Floats, coefficients: Floats, ephemerides: Floats, state: Floats) -> Vector3:
+        ax, ay, az = before(settings, coefficients, ephemerides, state)
+        if settings[first] != 0.0:
+            bx, by, bz = of_force(settings[first:last], coefficients[column], ephemerides, state)
+            return ax + bx, ay + by, az + bz
+        return ax, ay, az
+
+    return total
+
+
+def _sum_of_all() -> Sum:
+    total: Sum = _gravity_field
+    first = _GRAVITY_SETTINGS
+    for column, force in enumerate(FORCES):
+        total = _add(total, force, column, first)
+        first += len(force.parameters)
+    return total
+
+
+SETTINGS, COEFFICIENTS = len(list(leaves(Forces, {}))), len(FORCES)
+"""Length of `Forces.settings`, and columns of `Forces.coefficients`."""
+
+acceleration = _sum_of_all()
+"""Compiled sum of gravity and all forces in use, called as `Force.acceleration` with tuples of all settings and of
+all coefficients over the present mass."""
+
+
+def _cache_key() -> str:
+    digest = sha256()
+    for force in FORCES:
+        digest.update(repr(list(force.parameters)).encode())
+        digest.update(Path(inspect.getfile(inspect.unwrap(force.acceleration))).read_bytes())
+    return digest.hexdigest()
+
+
+CACHE_KEY = _cache_key()
+"""For kernels that call `acceleration`: registered forces may come from outside this package."""
