@@ -11,28 +11,28 @@ from formation_gnc.sil.scenario import find_scenario
 
 
 @pytest.mark.parametrize("law", ALGORITHMS)
-def test_a_design_is_one_json_object_with_what_the_law_has(law: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_design_is_one_json_object_with_the_figures_of_the_law(law: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["design", "leader_follower", "--controller", law, "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert (said["scenario"], said["deputy"], said["algorithm"]) == ("leader_follower", "deputy1", law)
-    assert all(real < 0.0 for real, _ in said["poles_1_s"]), "every law stabilises"
+    printed = json.loads(capsys.readouterr().out)
+    assert (printed["scenario"], printed["deputy"], printed["algorithm"]) == ("leader_follower", "deputy1", law)
+    assert all(real < 0.0 for real, _ in printed["poles_1_s"]), "every law stabilises"
     asked = {
         "lqr": {"gain [N/m, N/(m/s), N/(m s)]", "phase margin [deg]"},
         "hinf": {"best gamma", "gamma", "largest S", "largest T", "gain margin, up"},
         "mpc": {"horizon [s]", "variables", "constraints"},
     }
-    assert set(said["figures"]) >= asked.get(law, set())
+    assert set(printed["figures"]) >= asked.get(law, set())
 
 
-def test_a_design_is_printed_and_drawn_and_nothing_flies(
+def test_a_design_is_printed_and_drawn_without_a_flight(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["design", "geostationary", "--controller", "hinf", "--plot", "hinf.png"]) == 0
-    said = capsys.readouterr().out
+    printed = capsys.readouterr().out
     for words in ("geostationary, deputy1: hinf", "best gamma", "phase margin", "poles of the closed"):
-        assert words in said
-    assert said.endswith("plot: hinf.png\n")
+        assert words in printed
+    assert printed.endswith("plot: hinf.png\n")
     assert [path.name for path in tmp_path.iterdir()] == ["hinf.png"]
     assert Path("hinf.png").read_bytes().startswith(b"\x89PNG")
 
@@ -53,7 +53,7 @@ def test_a_design_is_printed_and_drawn_and_nothing_flies(
         (["bad.yaml", "--controller", "hinf"], "/deputy1/controller: hinf: the plant has poles on the imag"),
     ],
 )
-def test_what_cannot_be_designed_is_rejected_in_one_line(
+def test_an_impossible_design_is_rejected_in_one_line(
     options: list[str],
     words: str,
     tmp_path: Path,

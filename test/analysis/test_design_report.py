@@ -18,7 +18,7 @@ def described(**values):
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
-def test_every_law_is_described_and_drawn(algorithm, tmp_path):
+def test_every_law_is_reported_and_drawn(algorithm, tmp_path):
     designed = described(algorithm=algorithm, lqr__integral_error=3000.0)
     json.dumps(designed.figures)
     assert draw(designed, tmp_path / "design.png").stat().st_size > 10_000
@@ -29,7 +29,7 @@ def test_every_law_is_described_and_drawn(algorithm, tmp_path):
         assert np.abs(designed.recovery[0, 1:] - 1.0).max() == 0.0
 
 
-def test_lqr_margins_are_those_that_theory_promises():
+def test_lqr_margins_are_those_of_theory():
     # A continuous LQR with equal weights on the inputs has a gain margin of 1/2 to infinity and 60 degrees at
     # once in all of them; the tick takes a little of both (Safonov and Athans 1977).
     designed = described(algorithm="lqr", tick=1.0)
@@ -40,7 +40,7 @@ def test_lqr_margins_are_those_that_theory_promises():
 
 
 @pytest.mark.parametrize("changes", [{}, {"lqr__integral_error": 3000.0}, {"algorithm": "hinf"}])
-def test_the_loop_stays_stable_up_to_the_gain_margin(changes):
+def test_the_loop_is_stable_up_to_the_gain_margin(changes):
     # The same thing from the other side: scale the thrust and close the loop.
     parameters = load(ControllerParameters, VALUES | {k.replace("__", "."): v for k, v in changes.items()})
     own = getattr(parameters, parameters.algorithm)
@@ -53,13 +53,13 @@ def test_the_loop_stays_stable_up_to_the_gain_margin(changes):
         assert np.abs(np.linalg.eigvals(controller.closed_loop(phi, gamma * share))).max() < 1.0
 
 
-def test_hinf_keeps_its_bounds_in_the_picture():
+def test_hinf_singular_values_are_within_their_bounds():
     values = described(algorithm="hinf").singular_values
     for name, bound in {"S": "gamma / w_P", "T": "gamma / w_T", "KS [N/m]": "gamma / w_u [N/m]"}.items():
         assert (values[name].max(axis=1) <= values[bound].min(axis=1)).all()
 
 
-def test_a_loop_along_the_orbit_has_characteristic_exponents():
+def test_a_periodic_loop_has_characteristic_exponents():
     # Every gain stabilises the model as it is at its place; only over a revolution is that one loop. On a
     # circular orbit the exponents are the poles of the loop that does not vary.
     circular = described(algorithm="lqr", lqr__model="tschauner_hempel", lqr__gain="periodic")
@@ -77,7 +77,7 @@ def test_a_loop_along_the_orbit_has_characteristic_exponents():
     assert np.abs(eccentric.recovery[-1, 1:]).max() < 0.1
 
 
-def test_the_size_of_the_programme():
+def test_the_size_of_the_optimisation_problem():
     figures = described(algorithm="mpc", mpc__horizon=20, mpc__total_thrust=0.01).figures
     assert figures["variables"] == 60
     assert figures["constraints"] == 60 + 20 * 10
