@@ -1,4 +1,4 @@
-"""The command as a user meets it: what it prints, what it rejects, and how it ends."""
+"""The command line: output, rejections and exit status."""
 
 import argparse
 import json
@@ -26,7 +26,7 @@ DEFAULT = find_scenario("leader_follower").read_text()
 
 @pytest.fixture(autouse=True)
 def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """An empty directory to work in, and the signal handlers as they were."""
+    """An empty working directory; restores the signal handlers."""
     monkeypatch.chdir(tmp_path)
     before = signal.getsignal(signal.SIGTERM)
     yield tmp_path
@@ -34,7 +34,7 @@ def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def call(*arguments: str) -> int:
-    """Exit status of the command, however it comes about."""
+    """Exit status of the command."""
     try:
         return main(arguments)
     except SystemExit as end:
@@ -47,7 +47,7 @@ def scenario(path: Path, nodes: str, line: str) -> None:
 
 
 def rejection(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    """The one line that a wrong call is answered with."""
+    """The one line that rejects a call."""
     status = call(*arguments)
     output, errors = capsys.readouterr()
     assert (status, output) == (2, "")
@@ -117,8 +117,8 @@ BAD_PARAMETERS = [
 
 
 @pytest.mark.parametrize("way", [["--in-process"], []], ids=["in-process", "graph"])
-class TestRefusals:
-    """Whatever is wrong with what is given, nothing has been started or written when it is rejected."""
+class TestRejections:
+    """An input that is not allowed is rejected before anything is started or written."""
 
     @pytest.fixture(autouse=True)
     def nothing_starts(self, desk: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
@@ -157,27 +157,27 @@ class TestRefusals:
             ("/proc/self/mem", "/proc/self/mem: cannot be read (Input/output error)"),
         ],
     )
-    def test_a_scenario_that_is_not_there_is_named(
+    def test_a_missing_scenario_is_named(
         self, scenario: str, words: str, way: list[str], capsys: pytest.CaptureFixture[str]
     ) -> None:
         assert words in rejection(capsys, "sil", scenario, *way)
 
 
-def test_pace_and_in_process_do_not_go_together(capsys: pytest.CaptureFixture[str]) -> None:
-    said = rejection(capsys, "sil", "leader_follower", "--in-process", "--real-time-factor", "5")
-    assert "real_time_factor: has no effect in-process" in said
+def test_a_real_time_factor_is_rejected_in_process(capsys: pytest.CaptureFixture[str]) -> None:
+    printed = rejection(capsys, "sil", "leader_follower", "--in-process", "--real-time-factor", "5")
+    assert "real_time_factor: has no effect in-process" in printed
 
 
 @pytest.mark.parametrize(("arguments", "words"), [([], "required: COMMAND"), (["fly"], "invalid choice: 'fly'")])
-def test_a_command_that_there_is_not_is_answered_with_those_that_there_are(
+def test_an_unknown_command_is_rejected_with_a_hint(
     arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    said = rejection(capsys, *arguments)
-    assert words in said
-    assert said.endswith("see `formation-gnc --help`\n")
+    printed = rejection(capsys, *arguments)
+    assert words in printed
+    assert printed.endswith("see `formation-gnc --help`\n")
 
 
-def test_the_installed_command_rejects_in_one_line_too(desk: Path) -> None:
+def test_the_installed_command_rejects_in_one_line(desk: Path) -> None:
     ended = subprocess.run(
         ["formation-gnc", "sil", "nowhere"],
         cwd=desk,
@@ -191,9 +191,7 @@ def test_the_installed_command_rejects_in_one_line_too(desk: Path) -> None:
     assert ended.stderr.count("\n") == 1
 
 
-def test_json_is_one_object_with_the_names_that_scripts_hold_on_to(
-    desk: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_json_is_one_object_with_stable_names(desk: Path, capsys: pytest.CaptureFixture[str]) -> None:
     options = ["--duration", "30.5", "--seed", "5", "--bag", "flights/first", "--json", "--in-process"]
     assert call("sil", "leader_follower", *options) == 0
     summary = json.loads(capsys.readouterr().out)
@@ -214,7 +212,7 @@ def test_json_is_one_object_with_the_names_that_scripts_hold_on_to(
 
 def test_the_summary_names_the_figures_the_bag_and_the_picture(desk: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert call("sil", "leader_follower", "--controller", "coast", "--duration", "12", "--in-process") == 0
-    said = capsys.readouterr().out
+    printed = capsys.readouterr().out
     for words in (
         "final position error",
         "RMS position error",
@@ -222,16 +220,16 @@ def test_the_summary_names_the_figures_the_bag_and_the_picture(desk: Path, capsy
         "mean NIS",
         "delta-v",
     ):
-        assert words in said
-    assert "12 ticks, 0 missed" in said
+        assert words in printed
+    assert "12 ticks, 0 missed" in printed
     (bag,) = (desk / "bags").iterdir()
-    assert f"bag: bags/{bag.name}\n" in said
-    assert f"picture: bags/{bag.name}/overview.png\n" in said
+    assert f"bag: bags/{bag.name}\n" in printed
+    assert f"picture: bags/{bag.name}/overview.png\n" in printed
     assert (bag / "overview.png").read_bytes().startswith(b"\x89PNG")
     assert bag.name.startswith("leader_follower_")
 
 
-def test_an_interrupt_closes_the_bag_and_says_so(
+def test_an_interrupt_closes_the_bag(
     desk: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fly = Run.tick
@@ -247,47 +245,45 @@ def test_an_interrupt_closes_the_bag_and_says_so(
     assert Bag(desk / "cut").topics["/truth"].count == 20
 
 
-def test_a_satellite_that_comes_down_ends_the_run_with_the_bag_closed(
-    desk: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_reentry_ends_the_run_and_closes_the_bag(desk: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scenario(
         desk / "falling.yaml",
         "/**/plant",
         "deputy1.relative_state: [0, -90, 0, 0, -160, 0], forces.drag: true",
     )
     assert call("sil", "falling.yaml", "--bag", "down", "--in-process") == 1
-    said = capsys.readouterr().err
-    assert "below the Earth's surface" in said
-    assert said.endswith("bag closed: down\n")
+    printed = capsys.readouterr().err
+    assert "below the Earth's surface" in printed
+    assert printed.endswith("bag closed: down\n")
     # half an orbit down to a perigee in the thickest air
     assert 2000 < Bag(desk / "down").topics["/truth"].count < 2900
 
 
-def test_help_says_what_the_command_is_for_and_names_every_command(
+def test_help_names_every_command(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert call("--help") == 0
-    said = capsys.readouterr().out
-    assert "Fly satellites in formation" in said
+    printed = capsys.readouterr().out
+    assert "Fly satellites in formation" in printed
     for name in COMMANDS:
-        assert f"\n    {name} " in said
+        assert f"\n    {name} " in printed
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_the_help_of_a_command_describes_it_and_all_its_options(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_of_a_command_describes_all_its_options(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert call(name, "--help") == 0
-    said = capsys.readouterr().out
-    assert said.startswith(f"usage: formation-gnc {name}")
+    printed = capsys.readouterr().out
+    assert printed.startswith(f"usage: formation-gnc {name}")
     command = import_module(f"formation_gnc.commands.{name}")
-    assert (command.__doc__ or "").strip() in said
+    assert (command.__doc__ or "").strip() in printed
     parser = argparse.ArgumentParser()
     command.add_arguments(parser)
     for action in parser._actions:
         assert action.help, f"{action.dest} has no help"
-        assert max(action.option_strings or [action.dest], key=len) in said
+        assert max(action.option_strings or [action.dest], key=len) in printed
 
 
-def test_a_flight_does_not_wait_for_the_libraries_of_plots_and_reports() -> None:
+def test_a_flight_does_not_import_plotting_libraries() -> None:
     asked = (
         "import sys; from formation_gnc.cli import main; status = main(['sil', 'nowhere']); "
         "assert not {'matplotlib', 'plotly', 'pandas'} & set(sys.modules); sys.exit(status)"
@@ -295,6 +291,6 @@ def test_a_flight_does_not_wait_for_the_libraries_of_plots_and_reports() -> None
     assert subprocess.run([sys.executable, "-c", asked], check=False).returncode == 2
 
 
-def test_the_version_is_the_packages(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) -> None:
     assert call("--version") == 0
     assert capsys.readouterr().out == f"formation-gnc {__version__}\n"

@@ -9,12 +9,12 @@ from formation_gnc.errors import ConfigurationError
 
 
 @given(st.integers(1, 10**12))
-def test_a_tick_of_whole_nanoseconds_is_carried_exactly(nanoseconds: int) -> None:
+def test_a_tick_of_whole_nanoseconds_is_exact(nanoseconds: int) -> None:
     assert CommonParameters(Orbit(7e6), nanoseconds * 1e-9).tick_ns == nanoseconds
 
 
 @pytest.mark.parametrize("tick", [1.0 / 3.0, 1.5e-9, 1e-10])
-def test_a_tick_that_stamps_cannot_carry_is_rejected(tick: float) -> None:
+def test_a_tick_of_fractional_nanoseconds_is_rejected(tick: float) -> None:
     with pytest.raises(ConfigurationError) as rejection:
         CommonParameters(Orbit(7e6), tick)
     assert str(rejection.value) == (

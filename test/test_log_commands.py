@@ -1,4 +1,4 @@
-"""The commands that take recorded runs, on runs flown in-process."""
+"""Commands that take recorded runs, on in-process flights."""
 
 import json
 import signal
@@ -29,7 +29,7 @@ pytestmark = pytest.mark.usefixtures("without_pictures")
 
 @pytest.fixture(autouse=True)
 def handlers() -> Iterator[None]:
-    """Leave the signal handlers as they were."""
+    """Restore the signal handlers."""
     before = signal.getsignal(signal.SIGTERM)
     yield
     signal.signal(signal.SIGTERM, before)
@@ -41,8 +41,8 @@ def fly(directory: Path, *arguments: str) -> Path:
 
 
 @pytest.fixture(scope="module")
-def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return fly(tmp_path_factory.mktemp("bags") / "flown", "--duration", "300")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return fly(tmp_path_factory.mktemp("bags") / "reference", "--duration", "300")
 
 
 @pytest.fixture(scope="module")
@@ -50,72 +50,70 @@ def other(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return fly(tmp_path_factory.mktemp("bags") / "other", "--duration", "300", "--seed", "2")
 
 
-def test_recover_leaves_a_whole_bag_alone(flown: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["recover", str(flown)]) == 0
+def test_recover_leaves_a_whole_bag_alone(reference: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["recover", str(reference)]) == 0
     assert capsys.readouterr().out.startswith("whole: ")
-    assert not flown.with_name("flown_recovered").exists()
+    assert not reference.with_name("reference_recovered").exists()
 
 
-def test_recover_saves_a_cut_bag_and_says_what_is_lost(
-    flown: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_recover_saves_a_cut_bag_and_lists_the_losses(
+    reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (mcap,) = flown.glob("*.mcap")
+    (mcap,) = reference.glob("*.mcap")
     cut = tmp_path / "cut.mcap"
-    # a short flight is one chunk: whatever is cut from it is saved message by message
+    # a short flight is one chunk, which is saved message by message
     cut.write_bytes(mcap.read_bytes()[: mcap.stat().st_size // 2])
     assert main(["recover", str(cut), "--output", str(tmp_path / "saved"), "--json"]) == 3
-    said = json.loads(capsys.readouterr().out)
-    assert said["status"] == 3
-    assert said["output"] == str(tmp_path / "saved")
-    assert any("was not closed" in reason or "chunk" in reason for reason in said["reasons"])
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["status"] == 3
+    assert printed["output"] == str(tmp_path / "saved")
+    assert any("was not closed" in reason or "chunk" in reason for reason in printed["reasons"])
     saved = Bag(tmp_path / "saved")
     assert saved.damage is None
-    assert sum(topic.count for topic in saved.topics.values()) == said["saved"]
-    assert 0 < saved.topics["/truth"].count < Bag(flown).topics["/truth"].count
+    assert sum(topic.count for topic in saved.topics.values()) == printed["saved"]
+    assert 0 < saved.topics["/truth"].count < Bag(reference).topics["/truth"].count
     assert main(["recover", str(cut)]) == 3
-    assert (tmp_path / "cut_recovered").is_dir(), "beside the bag unless told otherwise"
+    assert (tmp_path / "cut_recovered").is_dir(), "beside the bag by default"
     assert "damaged: " in capsys.readouterr().out
 
 
-def test_recover_has_nothing_to_save_of_a_file_that_is_all_zeros(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_recover_saves_nothing_of_a_file_of_zeros(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "zeros.mcap").write_bytes(bytes(10_000))
     assert main(["recover", str(tmp_path / "zeros.mcap")]) == 1
     assert "nothing to save" in capsys.readouterr().out
     assert not (tmp_path / "zeros_recovered").exists()
 
 
-def test_commands_reject_a_bag_that_is_not_there_in_one_line(
-    tmp_path: Path, flown: Path, capsys: pytest.CaptureFixture[str]
+def test_a_missing_bag_is_rejected_in_one_line(
+    tmp_path: Path, reference: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     missing = str(tmp_path / "missing")
-    for arguments in (["recover", missing], ["compare", str(flown), missing], ["compare", str(flown)]):
+    for arguments in (["recover", missing], ["compare", str(reference), missing], ["compare", str(reference)]):
         assert main(arguments) == 2
         output, errors = capsys.readouterr()
         assert output == ""
         assert errors.count("\n") == 1
 
 
-def test_compare_says_what_is_the_same_and_what_is_not(
-    flown: Path, other: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_compare_names_identical_and_different_bags(
+    reference: Path, other: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     again = fly(tmp_path / "again", "--duration", "300")
     capsys.readouterr()
     picture = tmp_path / "plot.png"
-    assert main(["compare", str(flown), str(again), str(other), "--plot", str(picture)]) == 0
+    assert main(["compare", str(reference), str(again), str(other), "--plot", str(picture)]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert f"{again}: identical on every GNC topic" in lines
-    assert any(line.startswith(f"{other}: differs from {flown}") for line in lines)
+    assert any(line.startswith(f"{other}: differs from {reference}") for line in lines)
     assert any(line.startswith("  /deputy1/measurement at 0.000000000 s: ") for line in lines), "noise differs at once"
     assert picture.read_bytes().startswith(b"\x89PNG")
-    assert main(["compare", str(flown), str(again), str(other), "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)
-    same, changed = said["differences"]
+    assert main(["compare", str(reference), str(again), str(other), "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    same, changed = printed["differences"]
     assert same["identical"]
     assert set(same["figures"]["deputy1"].values()) == {0.0}
     assert not changed["identical"]
-    errors = [each["figures"]["deputy1"]["rms_error_m"] for each in said["bags"]]
+    errors = [each["figures"]["deputy1"]["rms_error_m"] for each in printed["bags"]]
     assert changed["figures"]["deputy1"]["rms_error_m"] == errors[2] - errors[0] != 0.0
 
 
@@ -133,44 +131,42 @@ SWAPS = """
 
 @pytest.mark.parametrize("nodes", ["navigation,guidance,controller", "controller", "navigation", "guidance"])
 def test_an_unchanged_replay_gives_the_recorded_bits(
-    flown: Path, tmp_path: Path, nodes: str, capsys: pytest.CaptureFixture[str]
+    reference: Path, tmp_path: Path, nodes: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    status, again = replayed(flown, tmp_path / "again", "--nodes", nodes)
+    status, again = replayed(reference, tmp_path / "again", "--nodes", nodes)
     assert status == 0
     assert capsys.readouterr().out.splitlines()[-1] == "identical on every GNC topic"
     assert {name: topic.count for name, topic in again.topics.items()} == {
-        name: topic.count for name, topic in Bag(flown).topics.items()
+        name: topic.count for name, topic in Bag(reference).topics.items()
     }
-    assert again.metadata["parameters /deputy1/controller"] == Bag(flown).metadata["parameters /deputy1/controller"]
+    assert again.metadata["parameters /deputy1/controller"] == Bag(reference).metadata["parameters /deputy1/controller"]
 
 
-def test_swaps_by_schedule_and_by_hand_are_flown_again_at_their_tick(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_scheduled_and_manual_changes_replay_at_their_tick(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "swaps.yaml").write_text(find_scenario("leader_follower").read_text() + SWAPS)
     bag = tmp_path / "swaps"
     assert main(["sil", str(tmp_path / "swaps.yaml"), "--in-process", "--bag", str(bag), "--duration", "300"]) == 0
     assert replayed(bag, tmp_path / "again")[0] == 0
     assert list(Bag(bag).arrays("/events")["kind"]).count(EventKind.PARAMETERS) == 3
-    # without the schedule in its parameters, the same swaps are changes that somebody made in flight
+    # without the schedule in the parameters, the same changes are manual ones
     recorded = Bag(bag)
     values = {node: parameters_of(recorded, node) for node in nodes_of(recorded, list(MODULES))}
     for each in values.values():
         each.pop("schedule", None)
-    said: list[tuple[str, int]] = []
+    copied: list[tuple[str, int]] = []
     outputs: list[tuple[str, Any]] = []
     replay(
         recorded,
         values,
         reader(recorded),
         lambda topic, record: outputs.append((topic, record)),
-        lambda topic, data, stamp: said.append((topic, stamp)),
+        lambda topic, data, stamp: copied.append((topic, stamp)),
     )
     laws = [record.algorithm for topic, record in outputs if topic == "/deputy1/status"]
     assert laws == ["lqr"] * 100 + ["coast"] * 100 + ["lqr"] * 100
     forces = np.array([record.force for topic, record in outputs if topic == "/deputy1/thrust"])
     assert forces.tobytes() == recorded.arrays("/deputy1/thrust")["force"].tobytes()
-    assert not {topic for topic, _ in said} & {topic for topic, _ in outputs if topic != "/events"}
+    assert not {topic for topic, _ in copied} & {topic for topic, _ in outputs if topic != "/events"}
 
 
 def rewritten(
@@ -196,103 +192,105 @@ def rewritten(
     return directory
 
 
-def test_an_answer_to_what_the_bag_lacks_is_taken_as_recorded_and_told(
-    flown: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_answers_to_missing_inputs_are_copied_and_reported(
+    reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     lost = {("/deputy1/estimate", 50 * NANOSECONDS): 0}
-    lacking = rewritten(Bag(flown), tmp_path / "lacking", lost, {})
+    lacking = rewritten(Bag(reference), tmp_path / "lacking", lost, {})
     status, again = replayed(lacking, tmp_path / "again", "--nodes", "guidance,controller")
     assert status == 0
     assert "2 answers as recorded" in capsys.readouterr().out
-    assert again.topics["/deputy1/thrust"].count == Bag(flown).topics["/deputy1/thrust"].count
+    assert again.topics["/deputy1/thrust"].count == Bag(reference).topics["/deputy1/thrust"].count
 
 
-def test_what_a_node_did_not_get_out_before_it_was_killed_is_not_missed(
-    flown: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_outputs_of_a_killed_node_are_not_expected(
+    reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     status, end = "/deputy1/status", 50 * NANOSECONDS
-    ticks = Bag(flown).arrays(status)["stamp_ns"].tolist()
+    ticks = Bag(reference).arrays(status)["stamp_ns"].tolist()
     timings = {stamp: codec(Timing).encode(Timing(stamp, "controller", 100_000)) for stamp in ticks}
     lost = {(status, end): 0}
-    whole = rewritten(Bag(flown), tmp_path / "whole", lost, {}, timings)
+    whole = rewritten(Bag(reference), tmp_path / "whole", lost, {}, timings)
     assert replayed(whole, tmp_path / "whole again", "--nodes", "controller")[0] == 1
     assert f"differs: {status} at 50.000000000 s: only in the second bag" in capsys.readouterr().out
     del timings[end]
-    killed = rewritten(Bag(flown), tmp_path / "killed", lost, {}, timings)
+    killed = rewritten(Bag(reference), tmp_path / "killed", lost, {}, timings)
     assert replayed(killed, tmp_path / "killed again", "--nodes", "controller")[0] == 0
 
 
-def test_a_node_started_again_flies_with_what_it_was_started_with_then_if_the_bag_has_it(
-    flown: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_a_restarted_node_replays_with_its_recorded_parameters(
+    reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     start, node = 50 * NANOSECONDS, "/deputy1/controller"
     first = {("/deputy1/thrust", start): 1}
-    values = Bag(flown).metadata[f"parameters {node}"]
+    values = Bag(reference).metadata[f"parameters {node}"]
     coast = {f"parameters {node} from {start}": values | {"algorithm": '"coast"'}}
     for name, metadata in (("known", coast), ("unknown", {})):
-        bag = rewritten(Bag(flown), tmp_path / name, first, metadata)
+        bag = rewritten(Bag(reference), tmp_path / name, first, metadata)
         status, again = replayed(bag, tmp_path / f"{name} again", "--nodes", "controller")
-        told = f"{node} was started again at 50 s; the bag lacks with which parameters"
-        said = capsys.readouterr().out
+        remark = f"{node} was started again at 50 s; the bag lacks with which parameters"
+        printed = capsys.readouterr().out
         laws = again.arrays("/deputy1/status")["algorithm"].tolist()
         if name == "known":  # LQR is what is recorded there
             assert status == 1
-            assert told not in said
+            assert remark not in printed
             assert laws == ["lqr"] * 50 + ["coast"] * (len(laws) - 50)
         else:
             assert status == 0
-            assert told in said
+            assert remark in printed
             assert set(laws) == {"lqr"}
-    # what somebody wants otherwise is so at every start
+    # an override holds at every start
     wanted = tmp_path / "wanted.yaml"
     wanted.write_text("/**/controller: {ros__parameters: {algorithm: hinf}}")
     _, again = replayed(tmp_path / "known", tmp_path / "other", "--nodes", "controller", "--params", str(wanted))
     assert set(again.arrays("/deputy1/status")["algorithm"].tolist()) == {"hinf"}
 
 
-def test_a_changed_replay_differs_where_it_was_changed_and_only_there(
-    flown: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_a_changed_replay_differs_only_where_it_was_changed(
+    reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     changed = tmp_path / "changed.yaml"
     changed.write_text("/**/controller: {ros__parameters: {algorithm: coast}}\n")
-    status, again = replayed(flown, tmp_path / "again", "--params", str(changed))
+    status, again = replayed(reference, tmp_path / "again", "--params", str(changed))
     assert status == 0
-    differing = [difference.topic for difference in identical(Bag(flown), again, gnc_topics(again))]
+    differing = [difference.topic for difference in identical(Bag(reference), again, gnc_topics(again))]
     assert differing == ["/deputy1/status", "/deputy1/thrust"]
     assert not again.arrays("/deputy1/thrust")["force"].any(), "coasting commands nothing"
 
 
-def test_replay_rejects_what_it_cannot_fly(flown: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_replay_rejects_invalid_nodes_and_parameters(
+    reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     wrong = tmp_path / "wrong.yaml"
     wrong.write_text("/**/controller: {ros__parameters: {algorithm: magic}}\n")
-    for arguments, said in (
+    for arguments, printed in (
         (["--nodes", "plant"], "nodes plant: must be some of navigation, guidance, controller"),
         (["--params", str(wrong)], "/deputy1/controller: parameter algorithm: 'magic' is not allowed"),
         (["--params", str(tmp_path / "missing.yaml")], "missing.yaml"),
         (["--bag", str(tmp_path)], "exists already"),
     ):
-        assert main(["replay", str(flown), "--bag", str(tmp_path / "no"), *arguments]) == 2
-        assert said in capsys.readouterr().err
+        assert main(["replay", str(reference), "--bag", str(tmp_path / "no"), *arguments]) == 2
+        assert printed in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("form", ["csv", "parquet"])
-def test_export_writes_every_topic_or_those_asked_for_and_the_attachments(
-    flown: Path, tmp_path: Path, form: str, capsys: pytest.CaptureFixture[str]
+def test_export_writes_topics_and_attachments(
+    reference: Path, tmp_path: Path, form: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     everything, some = tmp_path / "all", tmp_path / "some"
-    assert main(["export", str(flown), "--format", form, "--output", str(everything), "--attachments"]) == 0
-    bag = Bag(flown)
+    assert main(["export", str(reference), "--format", form, "--output", str(everything), "--attachments"]) == 0
+    bag = Bag(reference)
     written = {path.name for path in everything.iterdir()}
     filled = {topic.strip("/").replace("/", ".") for topic, each in bag.topics.items() if each.count}
     assert written == {f"{topic}.{form}" for topic in filled} | set(bag.attachments)
-    assert load_scenario(str(everything / "leader_follower.yaml")).plant.duration == 300.0, "to be flown again"
-    assert main(["export", str(flown), "--format", form, "--topic", "/truth", "--output", str(some)]) == 0
+    assert load_scenario(str(everything / "leader_follower.yaml")).plant.duration == 300.0, "flyable"
+    assert main(["export", str(reference), "--format", form, "--topic", "/truth", "--output", str(some)]) == 0
     (table,) = some.iterdir()
     frame = pd.read_csv(table) if form == "csv" else pd.read_parquet(table)
     assert frame["deputies.0.mass"].tolist() == bag.arrays("/truth")["deputies.0.mass"].tolist()
-    assert read(flown)["/truth"]["deputies.0.mass"].tolist() == frame["deputies.0.mass"].tolist()
+    assert read(reference)["/truth"]["deputies.0.mass"].tolist() == frame["deputies.0.mass"].tolist()
     capsys.readouterr()
-    assert main(["export", str(flown), "--topic", "/nothing", "--output", str(some)]) == 2
+    assert main(["export", str(reference), "--topic", "/nothing", "--output", str(some)]) == 2
     assert "has no topic /nothing" in capsys.readouterr().err
-    assert main(["export", str(flown), "--output", "/proc/nowhere"]) == 2
+    assert main(["export", str(reference), "--output", "/proc/nowhere"]) == 2
     assert "export to /proc/nowhere: " in capsys.readouterr().err

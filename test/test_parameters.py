@@ -53,7 +53,7 @@ allowed = st.fixed_dictionaries(
 
 
 @given(allowed)
-def test_what_is_allowed_is_loaded_as_given_and_dumped_again(values: dict[str, Any]) -> None:
+def test_allowed_values_are_loaded_and_dumped_unchanged(values: dict[str, Any]) -> None:
     network = load(Network, values)
     flat = dump(network)
     plain = {name: list(value) if isinstance(value, tuple) else value for name, value in flat.items()}
@@ -75,7 +75,7 @@ anything = st.recursive(
 
 
 @given(st.sampled_from(sorted(dump(load(Network, {"name": "near"})))), anything)
-def test_any_value_is_either_flown_in_range_or_rejected_by_name(name: str, value: Any) -> None:
+def test_any_value_is_in_range_or_rejected_by_name(name: str, value: Any) -> None:
     values = {"name": "near", name: value}
     try:
         network = load(Network, values)
@@ -126,34 +126,34 @@ def test_a_rejection_names_the_parameter_the_value_and_what_is_allowed(name: str
     assert str(rejection.value) == f"parameter {name}: {words}"
 
 
-def test_an_unknown_name_like_no_other_is_answered_with_all_that_are_known() -> None:
+def test_an_unknown_name_is_rejected_with_the_known_ones() -> None:
     with pytest.raises(ConfigurationError, match=r"parameter zzz: unknown; known: band, channels, down\.gain, .*"):
         load(Network, {"name": "near", "zzz": 1})
 
 
-def test_what_has_no_default_must_be_given() -> None:
+def test_a_parameter_without_default_is_required() -> None:
     with pytest.raises(ConfigurationError, match="parameter name: missing; give a string"):
         load(Network, {})
 
 
-def test_a_whole_number_is_as_good_as_a_double_and_becomes_one() -> None:
+def test_an_integer_is_converted_to_double() -> None:
     width = load(Network, {"name": "near", "up.width": 3}).up.width
     assert (width, type(width)) == (3.0, float)
 
 
-def test_two_nested_schemas_of_one_kind_keep_their_own_defaults() -> None:
+def test_nested_schemas_of_one_type_have_their_own_defaults() -> None:
     network = load(Network, {"name": "near", "up.width": 1.0})
     assert (network.up, network.down) == (Dish(10.0, 1.0), Dish(30.0, 2.0))
 
 
-def test_every_listed_name_has_its_own_parameters_and_no_other_has_any() -> None:
+def test_only_listed_names_have_parameters() -> None:
     values = {"name": "near", "stations": ["oslo", "lima"], "lima.masts": 3}
     assert load(Network, values).station == {"oslo": Station(), "lima": Station(masts=3)}
     with pytest.raises(ConfigurationError, match=r"parameter kiruna\.masts: unknown"):
         load(Network, values | {"kiruna.masts": 1})
 
 
-def test_leaves_say_what_ros_calls_their_types() -> None:
+def test_leaves_have_the_type_names_of_ros() -> None:
     types = {leaf.name: leaf.type_name for leaf in leaves(Network, {})}
     assert (
         types
@@ -169,7 +169,7 @@ def test_leaves_say_what_ros_calls_their_types() -> None:
     )
 
 
-def test_a_change_in_flight_leaves_the_original_alone() -> None:
+def test_a_change_in_flight_leaves_the_original_unchanged() -> None:
     network = load(Network, {"name": "near"})
     changed = change(network, {"band": "X", "up.width": 1})
     assert (changed.band, changed.up.width, changed.channels) == ("X", 1.0, network.channels)
@@ -186,13 +186,13 @@ def test_a_change_in_flight_leaves_the_original_alone() -> None:
         ({"kiruna.site": [0.0]}, "parameter kiruna.site: [0.0] is not allowed; it must be 2 values"),
     ],
 )
-def test_a_change_that_is_not_allowed_says_why(changes: dict[str, Any], words: str) -> None:
+def test_a_change_that_is_not_allowed_has_a_reason(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(ConfigurationError) as rejection:
         change(load(Network, {"name": "near"}), changes)
     assert str(rejection.value).startswith(words)
 
 
-def test_setting_what_is_fixed_to_the_value_it_has_is_no_change() -> None:
+def test_a_fixed_parameter_may_be_set_to_its_own_value() -> None:
     network = load(Network, {"name": "near"})
     assert change(network, {"open": False, "kiruna.site": np.zeros(2).tolist(), "up.gain": 10}) == network
 
@@ -210,7 +210,7 @@ def test_setting_what_is_fixed_to_the_value_it_has_is_no_change() -> None:
         ("e5", "e5"),
     ],
 )
-def test_numbers_are_read_as_ros_reads_them(text: str, value: Any) -> None:
+def test_numbers_are_read_as_in_ros(text: str, value: Any) -> None:
     read = read_yaml(text)
     assert (read, type(read)) == (value, type(value))
 

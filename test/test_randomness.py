@@ -17,7 +17,7 @@ def test_the_same_seed_and_name_give_the_same_bits_on_every_machine() -> None:
     ]
 
 
-def test_every_name_and_every_seed_has_a_stream_of_its_own() -> None:
+def test_every_name_and_seed_has_its_own_stream() -> None:
     first = [int(generator(seed, name).bit_generator.random_raw()) for seed in range(50) for name in NAMES]
     assert len(set(first)) == len(first)
 
@@ -31,7 +31,7 @@ def test_streams_are_not_correlated_at_any_small_lag() -> None:
             assert abs(np.corrcoef(a, b)[0, 1]) < 5.0 / np.sqrt(COUNT)
 
 
-def test_what_one_stream_gives_does_not_depend_on_what_others_gave() -> None:
+def test_streams_are_independent_of_one_another() -> None:
     alone = generator(3, "deputy1/sensors").standard_normal(10)
     busy, idle = generator(3, "deputy1/fixes"), generator(3, "deputy1/sensors")
     mixed = []

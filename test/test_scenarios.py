@@ -1,4 +1,4 @@
-"""Every scenario in params/, shortened: it flies, and its log is flown again to the same bits."""
+"""Every scenario in params/, shortened, flies and replays."""
 
 import json
 from pathlib import Path
@@ -17,14 +17,14 @@ TICKS = 60
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
-def test_every_scenario_is_replayed_to_the_recorded_bits(
+def test_every_scenario_replays_to_the_recorded_bits(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("signal.signal", lambda *_: None)  # the command means to own its process
     duration = TICKS * load_scenario(name).plant.tick
     bag = tmp_path / "bag"
-    flown = main(["sil", name, "--in-process", "--json", "--duration", str(duration), "--bag", str(bag)])
-    assert flown == 0
+    status = main(["sil", name, "--in-process", "--json", "--duration", str(duration), "--bag", str(bag)])
+    assert status == 0
     assert json.loads(capsys.readouterr().out)["ticks"] == TICKS
     assert main(["replay", str(bag), "--bag", str(tmp_path / "again")]) == 0
     assert capsys.readouterr().out.splitlines()[-1] == "identical on every GNC topic"

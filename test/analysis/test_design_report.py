@@ -18,7 +18,7 @@ def described(**values):
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
-def test_every_law_is_described_and_drawn(algorithm, tmp_path):
+def test_every_law_is_reported_and_drawn(algorithm, tmp_path):
     designed = described(algorithm=algorithm, lqr__integral_error=3000.0)
     json.dumps(designed.figures)
     assert draw(designed, tmp_path / "design.png").stat().st_size > 10_000

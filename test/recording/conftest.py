@@ -1,4 +1,4 @@
-"""A recorded flight of real messages, serialised by ROS itself."""
+"""Messages of a flight, serialized by ROS."""
 
 from collections.abc import Callable, Iterable
 from functools import cache
@@ -39,7 +39,7 @@ def message_type(type_name: str) -> MessageType:
     return installed_type(type_name)
 
 
-def flown(ticks: int, first: int = 0) -> list[Recorded]:
+def flight_messages(ticks: int, first: int = 0) -> list[Recorded]:
     """Messages of a flight: fixed and varying lengths, nested messages, an event now and then."""
     rng = np.random.default_rng(1)
     messages = []
@@ -88,7 +88,7 @@ def flown(ticks: int, first: int = 0) -> list[Recorded]:
 
 @pytest.fixture(scope="session")
 def flight() -> list[Recorded]:
-    return flown(TICKS)
+    return flight_messages(TICKS)
 
 
 Write = Callable[..., Path]
@@ -96,7 +96,7 @@ Write = Callable[..., Path]
 
 @pytest.fixture(scope="session")
 def write_bag() -> Write:
-    """Write messages to a bag; `wanted` says which to keep, further arguments go to the writer."""
+    """Write messages to a bag; options are those of the writer."""
 
     def write(directory: Path, messages: Iterable[Recorded], close: bool = True, **options: Any) -> Path:
         writer = BagWriter(directory, options.pop("provenance", {"run": {"seed": "1"}}), **options)

@@ -1,4 +1,4 @@
-"""What every command says to a bag that is none, or no longer one: a line with the reason, and no more."""
+"""Every command rejects a bad bag in one line."""
 
 import shutil
 import warnings
@@ -31,13 +31,13 @@ COMMANDS: dict[str, Callable[[Path, Path], list[str]]] = {
 
 @pytest.fixture(autouse=True)
 def _own_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("signal.signal", lambda *_: None)  # the command means to own its process
+    monkeypatch.setattr("signal.signal", lambda *_: None)  # the command sets signal handlers
 
 
 @pytest.fixture(scope="module")
-def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A whole bag of several chunks."""
-    directory = tmp_path_factory.mktemp("flown") / "bag"
+    directory = tmp_path_factory.mktemp("whole") / "bag"
     run = Run(load_scenario("leader_follower", {"/plant": {"duration": 20.0}}))
     with BagWriter(directory, {"run": {"scenario": "leader_follower"}}, {"a.yaml": b"a: 1\n"}) as writer:
         sink = InProcessRecorder(writer)
@@ -48,9 +48,9 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return directory
 
 
-def retyped(flown: Path, directory: Path, change: Callable[[TopicDefinition], TopicDefinition]) -> Path:
-    """The bag with other definitions, as another version of the messages would leave it."""
-    bag = Bag(flown)
+def retyped(whole: Path, directory: Path, change: Callable[[TopicDefinition], TopicDefinition]) -> Path:
+    """Copy of a bag with other definitions, as of another version of the messages."""
+    bag = Bag(whole)
     with BagWriter(directory, {}) as writer:
         for topic in bag.topics:
             schema, channel = bag.definition(topic)
@@ -63,7 +63,7 @@ def retyped(flown: Path, directory: Path, change: Callable[[TopicDefinition], To
 
 
 def older(definition: TopicDefinition) -> TopicDefinition:
-    """Messages as an older package had them: fields of other names."""
+    """Definition with other names of fields."""
     schema = definition.schema
     for name in (b"mass", b"relative_state", b"readings", b"force", b"iterations", b"kind"):
         schema = schema.replace(b" " + name, b" old_" + name)
@@ -85,9 +85,9 @@ def without_schema(path: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def bad(flown: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+def bad(whole: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     directory = tmp_path_factory.mktemp("bad")
-    (mcap,) = flown.glob("*.mcap")
+    (mcap,) = whole.glob("*.mcap")
     content = mcap.read_bytes()
     (directory / "empty").mkdir()
     (directory / "words.mcap").write_bytes(b"not a bag " * 100)
@@ -105,8 +105,8 @@ def bad(flown: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path
         "a bag without messages": directory / "silent",
         "a cut bag": directory / "cut.mcap",
         "a broken chunk": directory / "broken.mcap",
-        "another version's messages": retyped(flown, directory / "older", older),
-        "unknown schemas": retyped(flown, directory / "foreign", foreign),
+        "another version's messages": retyped(whole, directory / "older", older),
+        "unknown schemas": retyped(whole, directory / "foreign", foreign),
         "no schemas": without_schema(directory / "json.mcap"),
     }
 
@@ -117,12 +117,12 @@ KINDS = [
     *("another version's messages", "unknown schemas", "no schemas"),
 ]
 WHOLE_ENOUGH = {"a cut bag", "a bag without messages", "another version's messages"}
-"""What some command has a use for. The others save what they can, or say why not."""
+"""Kinds that some commands accept."""
 
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("command", COMMANDS)
-def test_a_bad_bag_is_answered_with_one_line(
+def test_a_bad_bag_is_rejected_in_one_line(
     bad: dict[str, Path], command: str, kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     status = main(COMMANDS[command](bad[kind], tmp_path))
@@ -143,12 +143,12 @@ def test_a_bad_bag_is_answered_with_one_line(
 @pytest.mark.parametrize("command", ["export", "compare", "navigate", "replay", "recover"])
 @settings(
     max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)  # the whole sweep of bytes is test_recover's
+)  # test_recover sweeps all bytes
 @given(data=st.data())
-def test_bytes_cut_and_flipped_anywhere_never_end_in_a_traceback(
-    flown: Path, tmp_path: Path, command: str, data: Any, capsys: pytest.CaptureFixture[str]
+def test_truncated_and_flipped_bytes_never_raise_a_traceback(
+    whole: Path, tmp_path: Path, command: str, data: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (mcap,) = flown.glob("*.mcap")
+    (mcap,) = whole.glob("*.mcap")
     content = bytearray(mcap.read_bytes())
     for at in data.draw(st.lists(st.integers(0, len(content) - 1), max_size=3)):
         content[at] ^= data.draw(st.integers(1, 255))

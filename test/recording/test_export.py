@@ -46,7 +46,7 @@ def test_parquet_keeps_numbers_text_and_ragged_arrays(bag_path, tmp_path) -> Non
     assert readings == [None if each is None else np.asarray(each).tolist() for each in recorded]
 
 
-def test_what_cannot_be_exported_is_said(bag_path, tmp_path) -> None:
+def test_an_export_that_is_not_possible_is_named(bag_path, tmp_path) -> None:
     bag = Bag(bag_path)
     with pytest.raises(ConfigurationError, match=r"\.csv or \.parquet"):
         export(bag, "/clock", tmp_path / "clock.xls")

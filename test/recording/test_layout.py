@@ -40,7 +40,7 @@ def panels(tree: Any) -> Iterator[str]:
         yield from panels(tree["second"])
 
 
-def test_every_path_of_the_layout_is_a_field_that_a_run_has(bag: Bag, tmp_path: Path) -> None:
+def test_every_path_of_the_layout_is_a_field_of_a_run(bag: Bag, tmp_path: Path) -> None:
     names = [f"deputy{number}" for number in (1, 2, 3, 4)]
     layout = json.loads(foxglove_layout(names))
     found = {
@@ -56,7 +56,7 @@ def test_every_path_of_the_layout_is_a_field_that_a_run_has(bag: Bag, tmp_path: 
             assert re.sub(r"\[\d\]$", "", field).replace("[:]", ".0") in fields[topic], field
 
 
-def test_every_panel_has_its_place_and_every_place_its_panel() -> None:
+def test_every_panel_is_placed_once() -> None:
     layout = json.loads(foxglove_layout(["a", "b"]))
     tabs = layout["configById"]["Tab!deputies"]["tabs"]
     placed = [*panels(layout["layout"]), *(panel for tab in tabs for panel in panels(tab["layout"]))]

@@ -1,4 +1,4 @@
-"""What a viewer may ask of a bag that is being played."""
+"""Requests of a viewer while a bag is played."""
 
 import math
 from pathlib import Path
@@ -13,18 +13,18 @@ from formation_gnc.recording.writer import BagWriter
 
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, math.nan, 100.0])
-def test_a_bag_is_played_to_its_end_whatever_speed_a_viewer_asks_for(tmp_path: Path, flight, speed) -> None:
+def test_a_bag_is_played_to_its_end_at_any_requested_speed(tmp_path: Path, flight, speed) -> None:
     with BagWriter(tmp_path / "run", {}) as writer:
         writer.add_topic("/clock", "rosgraph_msgs/msg/Clock", depth=10)
         for second in (1, 2, 3):
             writer.write("/clock", flight[0].data, second * 10**9, second)
     player = LivePlayer(Bag(tmp_path / "run"), 0, None, 200.0)
     try:
-        asked = SimpleNamespace(
+        request = SimpleNamespace(
             playback_command=PlaybackCommand.Play, playback_speed=speed, seek_time=None, request_id="1"
         )
-        state = player.on_playback_control_request(asked)
-        assert state.playback_speed == (speed if speed > 0.0 else 200.0), "the viewer is told what holds"
+        state = player.on_playback_control_request(request)
+        assert state.playback_speed == (speed if speed > 0.0 else 200.0), "the speed in force"
         played: list[int] = []
         player.view.show = lambda topic, data, stamp: played.append(stamp)
         player.play(lambda: len(played) == 3)

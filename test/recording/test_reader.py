@@ -30,11 +30,11 @@ def test_messages_come_in_recorded_order_and_as_written(bag_path, flight) -> Non
     assert list(Bag(bag_path).messages()) == [(m.topic, m.data, m.stamp_ns) for m in flight]
 
 
-def test_a_bare_file_is_the_same_bag(bag_path) -> None:
+def test_a_single_file_is_the_same_bag(bag_path) -> None:
     assert list(Bag(bag_path / "flight_0.mcap").messages()) == list(Bag(bag_path).messages())
 
 
-def test_topics_and_a_span_of_time_are_chosen(bag_path, flight) -> None:
+def test_messages_are_selected_by_topic_and_time(bag_path, flight) -> None:
     read_ = list(Bag(bag_path).messages(["/events", "/clock"], 28_500_000_000, 53_500_000_000))
     assert read_ == [
         (m.topic, m.data, m.stamp_ns)
@@ -49,7 +49,7 @@ def test_topics_are_listed_with_type_and_count(bag_path, flight) -> None:
     assert sum(t.count for t in topics.values()) == len(flight)
 
 
-def test_arrays_hold_what_was_sent(bag_path, flight) -> None:
+def test_arrays_equal_the_messages_sent(bag_path, flight) -> None:
     bag = Bag(bag_path)
     estimates = [m for m in flight if m.topic == "/deputy1/estimate"]
     arrays = bag.arrays("/deputy1/estimate")
@@ -98,7 +98,7 @@ def test_decoded_messages_have_the_fields_as_attributes(bag_path, flight) -> Non
         max_size=6,
     )
 )
-def test_arrays_equal_what_ros_itself_deserialises(messages) -> None:
+def test_arrays_equal_the_deserialization_of_ros(messages) -> None:
     kind = installed_type("formation_gnc_msgs/msg/Measurement")
     data = [serialize_message(message) for message in messages]
     arrays = kind.arrays(data)
@@ -112,14 +112,14 @@ def test_arrays_equal_what_ros_itself_deserialises(messages) -> None:
 
 
 @given(st.lists(st.builds(Event, node=text, subject=text, detail=text, tick=st.integers(0, 2**64 - 1)), min_size=1))
-def test_text_of_any_length_comes_back(messages) -> None:
+def test_text_of_any_length_is_read_back(messages) -> None:
     arrays = installed_type("formation_gnc_msgs/msg/Event").arrays([serialize_message(m) for m in messages])
     for field in ("node", "subject", "detail", "tick"):
         assert arrays[field].tolist() == [getattr(message, field) for message in messages]
 
 
 def test_canonical_bytes_depend_on_the_fields_alone() -> None:
-    # What ROS leaves between and after the fields is whatever was in memory; here it is what we put there.
+    # ROS leaves gaps and padding uninitialized.
     kind = installed_type("formation_gnc_msgs/msg/Target")
     data = bytearray(kind.canonical(serialize_message(Target(formation="ring", preview_step=Duration(sec=2)))))
     gap = data.index(b"ring\0") + 5
@@ -189,7 +189,7 @@ def test_unknown_schemas_are_rejected_by_name(schema, encoding) -> None:
         MessageType("a_msgs/msg/B", schema, encoding).arrays([bytes([0, 1, 0, 0]) + bytes(8)])
 
 
-def test_identical_bags_have_no_differences_whatever_order_processes_answered_in(tmp_path, write_bag, flight) -> None:
+def test_bags_that_differ_in_message_order_alone_are_identical(tmp_path, write_bag, flight) -> None:
     first = write_bag(tmp_path / "first", flight)
     otherwise = [m for _, tick in groupby(flight, key=lambda m: m.stamp_ns) for m in reversed(list(tick))]
     second = write_bag(tmp_path / "second", otherwise)
@@ -225,7 +225,7 @@ def test_the_first_difference_is_named_by_topic_stamp_and_field(tmp_path, write_
     assert "/deputy1/thrust at 50.5" in str(thrust)
 
 
-def test_a_topic_in_one_bag_alone_is_a_difference_and_in_none_an_error(tmp_path, write_bag, flight) -> None:
+def test_a_topic_in_one_bag_alone_is_a_difference(tmp_path, write_bag, flight) -> None:
     first = Bag(write_bag(tmp_path / "a", flight))
     second = Bag(write_bag(tmp_path / "b", [m for m in flight if m.topic != "/events"]))
     assert [(d.topic, d.stamp_ns) for d in identical(first, second, ["/events"])] == [("/events", 3_500_000_000)]
@@ -251,7 +251,7 @@ def test_bags_are_read_in_bounded_memory(tmp_path, flight) -> None:
 
 @pytest.mark.parametrize("compression", [CompressionType.NONE, CompressionType.LZ4])
 @pytest.mark.parametrize("chunked", [True, False])
-def test_other_recorders_files_are_read(tmp_path, flight, compression, chunked) -> None:
+def test_files_of_other_recorders_are_read(tmp_path, flight, compression, chunked) -> None:
     # rosbag2's "fastwrite" preset writes no chunks.
     path = tmp_path / "other.mcap"
     with path.open("wb") as stream:
@@ -269,27 +269,27 @@ def test_other_recorders_files_are_read(tmp_path, flight, compression, chunked) 
     assert [stamp for stamp, _, _ in bag.by_stamp(["/clock"])] == [1, 2, 3]
 
 
-def test_a_missing_empty_or_foreign_path_is_one_line(tmp_path) -> None:
+def test_a_missing_empty_or_foreign_path_is_rejected_in_one_line(tmp_path) -> None:
     (tmp_path / "empty").mkdir()
     (tmp_path / "text.mcap").write_text("this is no bag, only words")
     (tmp_path / "nothing.mcap").touch()
-    for name, said in [
+    for name, words in [
         ("none", "no such bag"),
         ("empty", "no .mcap"),
         ("text.mcap", "not"),
         ("nothing.mcap", "not"),
     ]:
-        with pytest.raises(ConfigurationError, match=f"{name}.*{said}") as caught:
+        with pytest.raises(ConfigurationError, match=f"{name}.*{words}") as caught:
             Bag(tmp_path / name)
         assert "\n" not in str(caught.value)
 
 
-def test_an_unknown_topic_is_named_with_those_there_are(bag_path) -> None:
+def test_an_unknown_topic_is_named_with_the_known_ones(bag_path) -> None:
     with pytest.raises(ConfigurationError, match=r"/nothing.*; it has /clock, /deputy1/estimate"):
         list(Bag(bag_path).messages(["/nothing"]))
 
 
-def test_a_damaged_chunk_is_an_error_that_says_what_to_do(tmp_path, write_bag, flight) -> None:
+def test_a_damaged_chunk_is_an_error_that_suggests_recovery(tmp_path, write_bag, flight) -> None:
     path = write_bag(tmp_path / "run", flight) / "run_0.mcap"
     data = bytearray(path.read_bytes())
     with path.open("rb") as stream:
@@ -300,7 +300,7 @@ def test_a_damaged_chunk_is_an_error_that_says_what_to_do(tmp_path, write_bag, f
         list(Bag(path).messages())
 
 
-def test_read_gives_a_frame_per_topic(bag_path) -> None:
+def test_read_returns_a_frame_per_topic(bag_path) -> None:
     pd = pytest.importorskip("pandas")
     frames = read(bag_path)
     assert isinstance(frames["/truth"], pd.DataFrame)
@@ -310,7 +310,7 @@ def test_read_gives_a_frame_per_topic(bag_path) -> None:
     assert frames["/clock"].index.name == "time"
 
 
-def test_read_without_pandas_says_how_to_get_it(bag_path, monkeypatch) -> None:
+def test_read_without_pandas_names_the_package(bag_path, monkeypatch) -> None:
     real = builtins.__import__
 
     def without_pandas(name, *args):

@@ -88,7 +88,7 @@ def test_a_whole_bag_is_left_alone(log, tmp_path) -> None:
     assert not (tmp_path / "saved").exists()
 
 
-def test_a_bag_cut_in_its_index_is_whole_again(log, damaged, tmp_path) -> None:
+def test_a_bag_cut_in_its_index_is_recovered_whole(log, damaged, tmp_path) -> None:
     path, messages, _ = log
     result, saved = damaged(path.read_bytes()[:-30])
     assert (result.status, result.reasons, result.lost) == (WHOLE, (), {})
@@ -99,7 +99,7 @@ def test_a_bag_cut_in_its_index_is_whole_again(log, damaged, tmp_path) -> None:
 
 @on_one_file
 @given(st.data())
-def test_a_cut_anywhere_loses_at_most_the_chunk_it_falls_in(log, damaged, data) -> None:
+def test_a_cut_loses_at_most_its_chunk(log, damaged, data) -> None:
     path, messages, spans = log
     content = path.read_bytes()
     cut = data.draw(st.integers(0, len(content) - 1))
@@ -118,7 +118,7 @@ def test_a_cut_anywhere_loses_at_most_the_chunk_it_falls_in(log, damaged, data) 
 
 @on_one_file
 @given(st.data())
-def test_flipped_bytes_never_pass_for_whole_and_spare_the_other_chunks(log, damaged, data) -> None:
+def test_a_flipped_byte_is_detected_and_spares_the_other_chunks(log, damaged, data) -> None:
     path, messages, spans = log
     content = bytearray(path.read_bytes())
     # Beyond the first chunk, which alone holds the definitions when the index is gone too.
@@ -147,7 +147,7 @@ def test_flipped_bytes_never_pass_for_whole_and_spare_the_other_chunks(log, dama
 
 @on_one_file
 @given(st.data())
-def test_any_damage_at_all_ends_in_a_verdict(log, damaged, data) -> None:
+def test_any_damage_ends_in_a_status(log, damaged, data) -> None:
     path, _, _ = log
     content = bytearray(path.read_bytes())
     for _ in range(data.draw(st.integers(1, 20))):
@@ -159,7 +159,7 @@ def test_any_damage_at_all_ends_in_a_verdict(log, damaged, data) -> None:
     assert result.status == WHOLE or result.reasons
 
 
-def test_a_broken_chunk_is_saved_up_to_the_break_and_its_loss_counted(log, damaged) -> None:
+def test_a_broken_chunk_is_saved_up_to_the_break(log, damaged) -> None:
     path, messages, spans = log
     content = bytearray(path.read_bytes())
     start, end = spans[3]
@@ -173,7 +173,7 @@ def test_a_broken_chunk_is_saved_up_to_the_break_and_its_loss_counted(log, damag
     assert any(f"chunk at byte {start}" in reason for reason in result.reasons)
 
 
-def test_a_chunk_with_a_wrong_checksum_alone_is_saved_and_said_to_be_unverified(log, damaged) -> None:
+def test_a_chunk_with_a_wrong_checksum_is_saved_unverified(log, damaged) -> None:
     path, messages, spans = log
     content = bytearray(path.read_bytes())
     content[spans[2][0] + 9 + 24] ^= 1  # the checksum stands after the two stamps and the size
@@ -183,7 +183,7 @@ def test_a_chunk_with_a_wrong_checksum_alone_is_saved_and_said_to_be_unverified(
     assert "unverified" in result.reasons[0]
 
 
-def test_the_new_bag_tells_what_was_lost(log, damaged) -> None:
+def test_the_recovered_bag_names_the_damage(log, damaged) -> None:
     path, _, spans = log
     result, _ = damaged(path.read_bytes()[: spans[4][1] - 7])
     recorded = Bag(result.output).metadata["recovery"]
@@ -191,7 +191,7 @@ def test_the_new_bag_tells_what_was_lost(log, damaged) -> None:
     assert "not closed" in recorded["reasons"]
 
 
-def test_a_definition_that_is_lost_is_said_so_and_the_rest_saved(log, damaged) -> None:
+def test_a_lost_definition_is_reported(log, damaged) -> None:
     path, _, spans = log
     content = path.read_bytes()
     # Without its first chunk and its index, the file has no definitions left.
@@ -202,7 +202,7 @@ def test_a_definition_that_is_lost_is_said_so_and_the_rest_saved(log, damaged) -
     assert not saved
 
 
-def test_split_bags_are_joined_and_a_missing_file_noticed(tmp_path, write_bag, flight) -> None:
+def test_split_bags_are_joined_and_a_missing_file_is_reported(tmp_path, write_bag, flight) -> None:
     from formation_gnc.recording.writer import Split
 
     path = write_bag(tmp_path / "run", flight, split=Split(max_duration=30.0))
@@ -220,7 +220,7 @@ def test_split_bags_are_joined_and_a_missing_file_noticed(tmp_path, write_bag, f
 
 
 @pytest.mark.parametrize("content", [b"", b"\x89MCAP0\r\n", b"words" * 1000])
-def test_nothing_to_save_says_why(damaged, content) -> None:
+def test_a_file_with_nothing_to_save_has_a_reason(damaged, content) -> None:
     result, _ = damaged(content)
     assert result.status == NOTHING_SAVED
     assert result.output is None

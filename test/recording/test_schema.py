@@ -21,7 +21,7 @@ TYPES = [
 
 
 @pytest.mark.parametrize("type_name", TYPES)
-def test_another_parser_hashes_the_schema_to_the_type_hash_of_ros(type_name: str) -> None:
+def test_the_schema_has_the_type_hash_of_ros(type_name: str) -> None:
     # RIHS01 covers every field name, type and array bound of the type and all it contains: text and hash
     # come from different files, and the hash is computed by a library that knows neither.
     store = get_typestore(Stores.EMPTY)
@@ -52,7 +52,7 @@ def test_schema_is_laid_out_as_rosbag2_writes_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("type_name", "said"),
+    ("type_name", "words"),
     [
         ("Header", "package/msg/Type"),
         ("std_msgs/srv/Header", "package/msg/Type"),
@@ -60,6 +60,6 @@ def test_schema_is_laid_out_as_rosbag2_writes_it() -> None:
         ("std_msgs/msg/NoSuch", "NoSuch.msg"),
     ],
 )
-def test_a_type_that_is_not_installed_is_named(type_name: str, said: str) -> None:
-    with pytest.raises(ConfigurationError, match=said):
+def test_a_type_that_is_not_installed_is_named(type_name: str, words: str) -> None:
+    with pytest.raises(ConfigurationError, match=words):
         schema_text(type_name)

@@ -6,7 +6,7 @@ from formation_gnc.recording.writer import BagWriter
 from formation_gnc.types import NANOSECONDS
 
 
-def test_a_trigger_writes_the_last_stretch_and_each_a_file_of_its_own(tmp_path, flight) -> None:
+def test_each_trigger_writes_the_last_duration_to_a_new_file(tmp_path, flight) -> None:
     writer = BagWriter(tmp_path / "run", {})
     for topic, type_name in dict.fromkeys((message.topic, message.type_name) for message in flight):
         writer.add_topic(topic, type_name, depth=10)
@@ -17,18 +17,18 @@ def test_a_trigger_writes_the_last_stretch_and_each_a_file_of_its_own(tmp_path, 
         if message.topic == "/clock" and message.stamp_ns in (50_500_000_000, 60_500_000_000):
             written.append(snapshot.trigger())
     writer.close()
-    spans = [(30.5, 50.5), (50.5, 60.5)]  # the second begins where the first ended: nothing twice
+    spans = [(30.5, 50.5), (50.5, 60.5)]  # contiguous, without overlap
     for file, (first, last), count in zip(("run_0", "run_1"), spans, written, strict=True):
         bag = Bag(tmp_path / "run" / f"{file}.mcap")
         assert (bag.start_ns, bag.end_ns) == ((first + (file == "run_0")) * 1e9, last * 1e9)
         assert sum(topic.count for topic in bag.topics.values()) == count
     kept = [(topic, data) for topic, data, _ in Bag(tmp_path / "run").messages()]
-    flown = [(m.topic, m.data) for m in flight]
-    first = flown.index(kept[0])
-    assert kept == flown[first : first + len(kept)], "one stretch without a gap"
+    sent = [(m.topic, m.data) for m in flight]
+    first = sent.index(kept[0])
+    assert kept == sent[first : first + len(kept)], "contiguous"
 
 
-def test_what_no_trigger_asked_for_is_not_written(tmp_path, flight) -> None:
+def test_nothing_is_written_without_a_trigger(tmp_path, flight) -> None:
     with BagWriter(tmp_path / "run", {}) as writer:
         writer.add_topic("/clock", "rosgraph_msgs/msg/Clock", depth=10)
         snapshot = Snapshot(writer, 20.0)
@@ -45,12 +45,12 @@ def kept_of(directory: Path, data: bytes, stamps: list[tuple[str, int]]) -> tupl
         for sequence, (topic, second) in enumerate(stamps):
             snapshot.write(topic, data, second * NANOSECONDS, sequence)
         count = snapshot.trigger()
-        snapshot.write("/late", data, 0, len(stamps))  # nothing is kept that it could be told to follow
+        snapshot.write("/late", data, 0, len(stamps))  # with nothing kept before
     bag = Bag(directory)
     return count, bag.start_ns // NANOSECONDS, bag.end_ns // NANOSECONDS
 
 
-def test_a_message_that_comes_late_counts_by_its_stamp(tmp_path, flight) -> None:
+def test_a_late_message_expires_by_its_stamp(tmp_path, flight) -> None:
     stamps = [("/clock", second) for second in range(100)]
     long_ago = [*stamps[:90], ("/late", 3), *stamps[90:]]
     just_over = [*stamps[:81], ("/late", 79), *stamps[81:]]
@@ -59,6 +59,6 @@ def test_a_message_that_comes_late_counts_by_its_stamp(tmp_path, flight) -> None
     assert kept_of(tmp_path / "over", flight[0].data, just_over) == (20, 80, 99)
 
 
-def test_a_run_that_begins_anew_is_kept_as_long_as_the_first(tmp_path, flight) -> None:
+def test_a_restarted_run_is_kept_as_long_as_the_first(tmp_path, flight) -> None:
     stamps = [("/clock", second) for second in [*range(100), *range(50)]]
     assert kept_of(tmp_path / "run", flight[0].data, stamps) == (20, 30, 49)

@@ -72,7 +72,7 @@ def test_channels_carry_the_quality_of_service_and_type_hash(bag_path) -> None:
         }
 
 
-def test_metadata_yaml_and_the_record_in_the_file_say_the_same(bag_path, flight) -> None:
+def test_metadata_yaml_equals_the_record_in_the_file(bag_path, flight) -> None:
     listed = yaml.safe_load((bag_path / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
     with (bag_path / "flight_0.mcap").open("rb") as stream:
         records = {record.name: record.metadata for record in make_reader(stream).iter_metadata()}
@@ -94,7 +94,7 @@ def test_stamps_are_simulated_time_alone(bag_path, flight) -> None:
     assert [m.sequence for m in messages] == list(range(len(flight)))
 
 
-def test_provenance_and_attachments_come_back_with_what_was_added_at_the_end(tmp_path, write_bag) -> None:
+def test_provenance_and_attachments_are_read_back(tmp_path, write_bag) -> None:
     with BagWriter(
         tmp_path / "run", {"run": {"seed": "7", "note": "ñ"}}, {"scenario.yaml": b"a: 1\n", "x.bin": b""}
     ) as writer:
@@ -114,7 +114,7 @@ def test_a_bag_without_messages_is_a_bag(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("split", [Split(max_duration=20.0), Split(max_bytes=20_000)])
-def test_a_split_bag_keeps_order_and_each_file_stands_alone(tmp_path, write_bag, flight, split) -> None:
+def test_a_split_bag_keeps_order_and_each_file_is_complete(tmp_path, write_bag, flight, split) -> None:
     path = write_bag(tmp_path / "run", flight, split=split)
     files = sorted(path.glob("*.mcap"))
     listed = yaml.safe_load((path / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
@@ -136,7 +136,7 @@ def test_a_split_bag_keeps_order_and_each_file_stands_alone(tmp_path, write_bag,
         assert all(file.stat().st_size < 3 * split.max_bytes for file in files)
 
 
-def test_a_bag_that_is_still_written_is_a_bag_already(tmp_path, write_bag, flight) -> None:
+def test_a_bag_can_be_read_while_it_is_written(tmp_path, write_bag, flight) -> None:
     path = write_bag(tmp_path / "run", flight, close=False)
     listed = yaml.safe_load((path / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
     assert {topic["topic_metadata"]["name"] for topic in listed["topics_with_message_count"]} == {
@@ -148,7 +148,7 @@ def test_a_bag_that_is_still_written_is_a_bag_already(tmp_path, write_bag, fligh
     assert bag.topics["/truth"].count == sum(m.topic == "/truth" for m in flight)
 
 
-def test_messages_reach_the_disk_while_others_follow_without_a_flush(tmp_path, flight) -> None:
+def test_messages_reach_the_disk_without_an_explicit_flush(tmp_path, flight) -> None:
     writer = BagWriter(tmp_path / "run", {})
     writer.add_topic("/clock", "rosgraph_msgs/msg/Clock", depth=10)
     clock = flight[0]
@@ -166,7 +166,7 @@ from formation_gnc.recording.writer import BagWriter
 writer = BagWriter(Path(sys.argv[1]), {"run": {"seed": "1"}})
 writer.add_topic("/clock", "rosgraph_msgs/msg/Clock", depth=10)
 print(time.monotonic_ns(), flush=True)
-while True:  # the stamp is the wall time, so the last one kept tells what the kill took
+while True:  # stamped with wall time, to measure the loss
     writer.write("/clock", bytes([0, 1, 0, 0]) + bytes(8), time.monotonic_ns(), 0)
     time.sleep(0.001)
 """
@@ -176,7 +176,7 @@ while True:  # the stamp is the wall time, so the last one kept tells what the k
     "moment",
     [0.9, *(pytest.param(0.1 * (number + number % 7), marks=pytest.mark.slow) for number in range(20))],
 )
-def test_a_kill_takes_at_most_half_a_second(tmp_path, moment) -> None:
+def test_a_kill_loses_at_most_half_a_second(tmp_path, moment) -> None:
     process = subprocess.Popen(
         [sys.executable, "-c", WRITES_UNTIL_KILLED, str(tmp_path / "run")], stdout=subprocess.PIPE, text=True
     )
@@ -218,7 +218,7 @@ def test_a_split_that_cannot_be_kept_is_rejected(split) -> None:
         Split(**split)
 
 
-def test_wrong_use_is_rejected_and_harms_nothing(tmp_path, flight) -> None:
+def test_wrong_use_is_rejected_without_effect(tmp_path, flight) -> None:
     writer = BagWriter(tmp_path / "run", {})
     writer.add_topic("/clock", "rosgraph_msgs/msg/Clock", depth=10)
     with pytest.raises(ConfigurationError, match="/clock"):
@@ -238,7 +238,7 @@ def test_wrong_use_is_rejected_and_harms_nothing(tmp_path, flight) -> None:
     assert list(Bag(tmp_path / "run").messages()) == [("/clock", flight[0].data, 5)]
 
 
-def test_a_full_disk_is_one_clear_error_and_what_was_written_stays_readable(tmp_path, flight) -> None:
+def test_a_full_disk_leaves_the_written_part_readable(tmp_path, flight) -> None:
     # A limit on the file size fails a write in the middle, as a full disk does. (The signal that comes with
     # it is ignored by Python, which leaves EFBIG.)
     script = """
