@@ -36,7 +36,7 @@ def test_a_single_satellite_has_no_separation() -> None:
 
 
 @pytest.mark.usefixtures("without_pictures")
-def test_what_guidance_foresaw_is_the_least_of_all_it_said(
+def test_predicted_approach_is_the_least_published_separation(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("signal.signal", lambda *_: None)  # the command sets signal handlers
