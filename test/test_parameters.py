@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from formation_gnc.errors import ConfigurationError
@@ -52,6 +52,7 @@ allowed = st.fixed_dictionaries(
 )
 
 
+@settings(deadline=None)
 @given(allowed)
 def test_allowed_values_are_loaded_and_dumped_unchanged(values: dict[str, Any]) -> None:
     network = load(Network, values)
@@ -74,6 +75,7 @@ anything = st.recursive(
 )
 
 
+@settings(deadline=None)
 @given(st.sampled_from(sorted(dump(load(Network, {"name": "near"})))), anything)
 def test_any_value_is_in_range_or_rejected_by_name(name: str, value: Any) -> None:
     values = {"name": "near", name: value}

@@ -61,9 +61,6 @@ def predicted_approach(bag: Bag, kind: str) -> Separation | None:
         index = int(predicted[kind].argmin())
         distance = float(predicted[kind][index])
         if nearest is None or distance < nearest.distance:
-            when, other = (
-                1e-9 * nanoseconds(predicted, f"{kind}_time")[index],
-                str(predicted[f"{kind}_neighbour"][index]),
-            )
-            nearest = Separation(distance, float(when), (name, other))
+            time = 1e-9 * float(nanoseconds(predicted, f"{kind}_time")[index])
+            nearest = Separation(distance, time, (name, str(predicted[f"{kind}_neighbour"][index])))
     return nearest

@@ -1,4 +1,4 @@
-"""Whose parameters a recording still lacks, and when to ask for them."""
+"""Collection of the parameters of all nodes of a run, for a recording."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
@@ -8,40 +8,40 @@ from formation_gnc.flight.graph import GRAPH
 from formation_gnc.recording.provenance import parameters_record
 
 ASK_AGAIN = 2.0
-"""Wall time (s) after which a node is asked again: ROS drops an answer to a client that it has not discovered yet,
-which happens when many nodes start on a busy machine."""
+"""Wall time (s) after which a request is repeated: ROS drops the answer to a client that it has not discovered
+yet, as happens when many nodes start on a busy machine."""
 
 PLANT = "/plant"
 
 
 @dataclass
 class ParameterCollection:
-    """Parameters of all nodes of a run: each asked for when it appears, and again when it was started again."""
+    """Parameters of all nodes of a run, requested when a node appears and after every restart."""
 
     values: dict[str, Mapping[str, Any]] = field(default_factory=dict)
     """Latest parameters by full node name."""
 
     def __post_init__(self) -> None:
-        """Nobody is known."""
+        """Start with no node known."""
         self._known: set[str] = set()
         self._wanted: dict[str, str] = {}
         self._asked: dict[str, float] = {}
 
     def appeared(self, nodes: Collection[str]) -> list[str]:
-        """Note the nodes that are there; returns those seen for the first time."""
+        """Take the nodes that exist; returns the new ones."""
         new = [node for node in nodes if node not in self._known]
         self._known.update(new)
         self._wanted |= {node: parameters_record(node) for node in new}
         return new
 
     def restarted(self, node: str, stamp: int) -> None:
-        """Ask a node again that was started again and answered a stamp (ns) first."""
+        """Request the parameters of a restarted node again; `stamp` (ns) is that of its first answer."""
         if node in self._known:
             self._wanted[node] = parameters_record(node, stamp)
             self._asked.pop(node, None)
 
     def due(self, now: float) -> dict[str, str]:
-        """Nodes to be asked at a time (s), with the names of the records for their answers."""
+        """Nodes whose request is due at a time (s), with the names of the metadata records for the answers."""
         return {
             node: record
             for node, record in self._wanted.items()
@@ -49,11 +49,11 @@ class ParameterCollection:
         }
 
     def asked(self, node: str, now: float) -> None:
-        """Note that a node was asked at a time (s)."""
+        """Note the time (s) of a request."""
         self._asked[node] = now
 
     def received(self, node: str, record: str, values: Mapping[str, Any]) -> bool:
-        """Take an answer; returns whether it is to go on record: not one to a question that is out of date."""
+        """Take an answer; returns whether to record it, which an answer to an outdated request is not."""
         if self._wanted.get(node) != record:
             return False
         del self._wanted[node]

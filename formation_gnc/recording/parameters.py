@@ -8,7 +8,7 @@ from formation_gnc.parameters import parameter
 
 @dataclass(frozen=True)
 class RecorderParameters(CommonParameters):
-    """Where to record to, and how much."""
+    """Parameters of the recorder node."""
 
     bag: str = parameter("", doc="directory to make for the bag; empty for bags/ and the date and time")
     split_size: int = parameter(

@@ -1,10 +1,10 @@
-"""Plays a bag tick by tick: what is due, whose answer is awaited, at which pace."""
+"""Playback of a bag tick by tick, waiting for the answers of nodes that take part."""
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 
 from formation_gnc.common import ANY_ORBIT, CommonParameters, Orbit
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import BagError, ParameterError
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import COMMAND
 from formation_gnc.parameters import parameter
@@ -14,7 +14,7 @@ from formation_gnc.types import NANOSECONDS
 
 @dataclass(frozen=True)
 class ReplayParameters(CommonParameters):
-    """What to play, and how fast."""
+    """Parameters of the replay node."""
 
     chief: Orbit = ANY_ORBIT
     bag: str = parameter("", doc="bag to play")
@@ -32,41 +32,52 @@ class ReplayParameters(CommonParameters):
     )
 
     def __post_init__(self) -> None:
-        """Raise ConfigurationError for a bag that is not named, and times that leave nothing to play."""
+        """Raise ParameterError for an end that is not after the start."""
         super().__post_init__()
         if not self.start < self.end:
-            raise ConfigurationError(f"parameter end: {self.end} is not allowed; it must be above start, {self.start}")
+            raise ParameterError(f"parameter end: {self.end} is not allowed; it must be above start, {self.start}")
 
 
 @dataclass(frozen=True)
 class PlayedTick:
-    """What was recorded of one stamp."""
+    """Recorded messages of one stamp."""
 
     stamp: int
     """ns."""
     messages: list[tuple[str, bytes]]
     """Topics and CDR bytes to play."""
     answers: set[str]
-    """Topics on which a command answered it when it was recorded."""
+    """Topics of the commands that answered the tick in the recorded run."""
 
 
 class TickPlayer:
-    """Plays all that was recorded of a stamp, waits for the commands of those who answer, and goes on.
+    """Plays the messages of a stamp, waits for the commands that answer it, and continues with the next.
 
-    Nobody is waited for on a tick that had no answer when it was recorded. Times `now` are seconds of a
+    A command is awaited where it has a publisher and the recorded tick had it. Times `now` are seconds of a
     monotonic wall clock.
 
-    topics: what is played. answers: commands that are awaited where somebody gives them. done: whether all is
-    played. paused: whether to wait for `step`.
+    Attributes:
+        topics: topics that are played.
+        answers: topics of commands that may be awaited.
+        awaited: topics of commands that are awaited now.
+        stamp: of the last tick played, ns; None before the first.
+        done: whether all ticks are played.
+        paused: whether to wait for `step`.
     """
 
     def __init__(self, parameters: ReplayParameters, play: Callable[[PlayedTick], None]) -> None:
-        """Open the bag; raises ConfigurationError when it cannot be played.
+        """Open the bag.
 
-        play: publishes a tick's messages, and its stamp as the time.
+        Args:
+            parameters: of the playback.
+            play: publishes the messages of a tick, and its stamp as the time.
+
+        Raises:
+            ParameterError: no bag is named.
+            BagError: the bag cannot be read, or lacks a topic.
         """
         if not parameters.bag:
-            raise ConfigurationError("parameter bag: missing; give a bag to play")
+            raise ParameterError("parameter bag: missing; give a bag to play")
         self._parameters, self._play = parameters, play
         self.bag = Bag(parameters.bag)
         measured = [topics.MEASUREMENT.of(deputy) for deputy in topics.deputies_in(self.bag.topics)]
@@ -74,7 +85,7 @@ class TickPlayer:
         self.topics = [name for name in parameters.topics or default if name != topics.CLOCK.name]
         for name in self.topics:
             if name not in self.bag.topics:
-                raise ConfigurationError(f"topic {name}: not in the bag; it has {', '.join(sorted(self.bag.topics))}")
+                raise BagError(f"topic {name}: not in the bag; it has {', '.join(sorted(self.bag.topics))}")
         played = {topics.deputy_of(name) for name in self.topics if name in measured}
         self.answers = {COMMAND.of(deputy) for deputy in played} & self.bag.topics.keys() - set(self.topics)
         self.done, self.paused = False, parameters.paused
@@ -84,14 +95,14 @@ class TickPlayer:
         self._played_at = 0.0
 
     def advance_if_due(self, now: float, is_published: Callable[[str], bool]) -> list[str]:
-        """Play the next tick if it is time.
+        """Play the next tick if it is due.
 
         Args:
             now: s.
-            is_published: whether anybody publishes a topic, and so can answer.
+            is_published: whether a topic has a publisher.
 
         Returns:
-            Topics whose answer is given up.
+            Topics whose answer did not come in time.
         """
         waited = now - self._played_at
         if self.paused or self.done or (self.awaited and waited < self._parameters.patience):
@@ -113,12 +124,12 @@ class TickPlayer:
         self._play(tick)
 
     def answer(self, topic: str, stamp: int) -> None:
-        """Take an answer to a stamp, ns."""
+        """Take an answer to the tick of a stamp, ns."""
         if stamp == self.stamp:
             self.awaited.discard(topic)
 
     def _read(self) -> Iterator[PlayedTick]:
-        """Every tick, for ever when looping."""
+        """All ticks; endless when looping."""
         wanted = sorted({*self.topics, *self.answers})
         while True:
             any_played = False

@@ -1,4 +1,4 @@
-"""How far a recording has come: the stamp up to which everything of a run is on record."""
+"""Progress of a recording: the stamp up to which a run is recorded completely."""
 
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import GRAPH
@@ -8,31 +8,31 @@ NONE = -1
 
 
 class RecordingProgress:
-    """Stamp up to which the plant's messages and every deputy's answers, or their misses, have come.
+    """Stamp up to which all messages of the plant and all answers of the deputies, or their misses, are recorded.
 
-    Fed with the stamps of what comes, in any order between topics. A run's last event is stamped after the last
-    tick; progress reaches it when everything else has come.
+    Topics may be recorded in any order relative to one another. The last event of a run is stamped after the
+    last tick; progress reaches it when everything else is recorded.
     """
 
     def __init__(self) -> None:
-        """Nothing has come."""
+        """Start with nothing recorded."""
         self._answer_names = tuple(row.answer.name for row in GRAPH)
         self.reset()
 
     def reset(self) -> None:
-        """Start over: the plant was started again."""
+        """Start over, after a restart of the plant."""
         self._plant: dict[str, int] = {}
         self._answers: dict[str, dict[str, int]] = {}
         self._missed: dict[str, int] = {}
         self._event = NONE
 
     def concerns(self, topic: str) -> bool:
-        """Whether progress depends on a topic, so that `take` is to be told its stamps."""
+        """Whether progress depends on a topic."""
         name = topic.rpartition("/")[2]
         return topic in (topics.CLOCK.name, topics.TRUTH.name) or name in (topics.MEASUREMENT.name, *self._answer_names)
 
     def take(self, topic: str, stamp: int) -> None:
-        """Note a message of a topic that progress depends on, stamped in ns."""
+        """Take the stamp (ns) of a message of a topic that concerns progress."""
         deputy, name = topics.deputy_of(topic), topic.rpartition("/")[2]
         if name in self._answer_names:
             self._answers_of(deputy)[name] = stamp
@@ -42,14 +42,14 @@ class RecordingProgress:
         self._plant[topic] = stamp
 
     def take_event(self, stamp: int, missed_by: str = "") -> None:
-        """Note an event, stamped in ns, and the deputy that missed its tick if it is a miss."""
+        """Take the stamp (ns) of an event, and for a miss the deputy that missed its tick."""
         self._event = stamp
         if missed_by:
             self._missed[missed_by] = stamp
 
     @property
     def stamp(self) -> int:
-        """Stamp (ns) up to which everything has come; -1 for nothing."""
+        """Stamp (ns) up to which everything is recorded; -1 for nothing."""
         stamps = set(self._plant.values())
         for topic in self._plant:
             deputy = topics.deputy_of(topic)

@@ -1,4 +1,4 @@
-"""One recording: every message into a bag, with what is lost, how far it is, and with which parameters it flew."""
+"""Recording of a run: messages, losses, progress and parameters."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -16,13 +16,14 @@ from formation_gnc.recording.writer import BagWriter
 from formation_gnc.records import Event, EventKind
 
 REPORT_TICKS = 64
-"""Ticks after which progress is reported at the latest."""
+"""Most ticks between two reports of progress."""
 
 
 class RecordingSession:
-    """Takes what comes on every topic and writes it to a bag.
+    """Writes the messages of all topics to a bag.
 
-    failure: why the disk took no more; from then on nothing is recorded.
+    Attributes:
+        failure: error of the disk, after which nothing is recorded; None for none.
     """
 
     def __init__(
@@ -38,8 +39,8 @@ class RecordingSession:
         Args:
             bag: closed by `close`.
             scenario: its name, for the bag's metadata.
-            report: takes the stamp (ns) up to which everything is recorded, whenever it has changed.
-            decode_event: the event that a message on `/events` carries.
+            report: receives the stamp (ns) up to which everything is recorded, whenever it has changed.
+            decode_event: decodes a message on `/events`.
             snapshot: s of simulated time to keep in memory until `write_snapshot`; 0 to write everything at once.
         """
         self.bag, self._scenario, self._decode_event = bag, scenario, decode_event
@@ -94,14 +95,14 @@ class RecordingSession:
         return self.while_disk_lasts(take)
 
     def report_progress(self) -> None:
-        """Report how far the recording is, if that has changed."""
+        """Report the progress, if it has changed."""
         stamp = self.progress.stamp
         if stamp != self._reported:
             self._reported = stamp
             self._report(stamp)
 
     def put_on_record(self, node: str, record: str, values: Mapping[str, Any], left_out: tuple[str, ...] = ()) -> None:
-        """Write a node's parameters at once, so that a bag that is cut short can be replayed."""
+        """Write the parameters of a node at once, so that a bag that is cut short can be replayed."""
         if not self.parameters.received(node, record, values):
             return
         recorded = {name: to_json(value) for name, value in values.items() if name not in left_out}
@@ -111,7 +112,7 @@ class RecordingSession:
             self.bag.add_attachment(LAYOUT, foxglove_layout(values.get("deputies", ())).encode())
 
     def write_snapshot(self) -> tuple[bool, str]:
-        """Write the stretch of simulated time kept in memory; returns whether that succeeded, and how in words."""
+        """Write the messages kept in memory; returns whether that succeeded, and a message for people."""
         written: list[str] = []
 
         def write() -> None:
@@ -122,7 +123,7 @@ class RecordingSession:
         return bool(written), written[0] if written else str(self.failure)
 
     def new_losses(self) -> dict[str, int]:
-        """Messages lost so far by topic, if there are more than when last asked; else empty."""
+        """Messages lost so far by topic, if there are more than at the last call; else empty."""
         lost = {topic: each.lost for topic, each in self._losses.items() if each.lost}
         total = sum(lost.values())
         if total <= self._lost:
@@ -131,12 +132,12 @@ class RecordingSession:
         return lost
 
     def is_quiet(self) -> bool:
-        """Whether nothing has come since this was last asked; not before it is asked twice."""
+        """Whether nothing was received since the last call; False at the first."""
         quiet, self._received = not self._received, False
         return quiet
 
     def while_disk_lasts[**P](self, work: Callable[P, None]) -> Callable[P, None]:
-        """`work` until the disk fails, which an executor would not let through."""
+        """Wrap `work` to stop at an error of the disk, which an executor would swallow."""
 
         def guarded(*arguments: P.args, **keywords: P.kwargs) -> None:
             if self.failure is None:
@@ -155,6 +156,6 @@ class RecordingSession:
 
 
 def _answering(topic: str) -> str:
-    """Full name of the module that answers on a topic; empty for none."""
+    """Full name of the module that answers a tick on a topic; empty for none."""
     deputy, name = topics.deputy_of(topic), topic.rpartition("/")[2]
     return next((f"/{deputy}/{row.name}" for row in MODULES.values() if deputy and row.answer.name == name), "")

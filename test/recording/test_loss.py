@@ -2,7 +2,7 @@
 
 from itertools import count
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from formation_gnc.recording.loss import LossCounter
@@ -12,6 +12,7 @@ def counter(publishers: int = 1, from_the_first: bool = True) -> LossCounter:
     return LossCounter(lambda: publishers, from_the_first)
 
 
+@settings(deadline=None)
 @given(st.lists(st.booleans(), min_size=1, max_size=50))
 def test_gaps_of_a_publisher_are_counted_up_to_its_last_arrival(arrives: list[bool]) -> None:
     loss = counter()
@@ -21,6 +22,7 @@ def test_gaps_of_a_publisher_are_counted_up_to_its_last_arrival(arrives: list[bo
     assert loss.lost == sum(missed) == last - came
 
 
+@settings(deadline=None)
 @given(st.lists(st.integers(0, 3), max_size=60))
 def test_interleaved_publishers_lose_nothing(order: list[int]) -> None:
     loss, sent = counter(publishers=4), [0, 0, 0, 0]
@@ -29,6 +31,7 @@ def test_interleaved_publishers_lose_nothing(order: list[int]) -> None:
         assert loss.take(sent[publisher]) == 0
 
 
+@settings(deadline=None)
 @given(st.lists(st.integers(0, 2), min_size=30, max_size=60), st.integers(15, 29), st.integers(1, 4))
 def test_a_gap_among_several_publishers_is_counted_once(order: list[int], at: int, gap: int) -> None:
     loss, sent = counter(publishers=3), [0, 0, 0]

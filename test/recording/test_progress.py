@@ -2,7 +2,7 @@
 
 from itertools import permutations
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from formation_gnc.flight import topics
@@ -66,6 +66,7 @@ def test_a_plant_started_again_starts_progress_again() -> None:
     assert progress.stamp == 0
 
 
+@settings(deadline=None)
 @given(st.permutations([(topic, tick) for topic in TICK for tick in range(4)]))
 def test_progress_never_runs_ahead_of_a_topic(arrivals: list[tuple[str, int]]) -> None:
     """Topics keep their own order; between topics any order is possible."""

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from builtin_interfaces.msg import Duration
 from formation_gnc_msgs.msg import Event, Measurement, Reading, Target
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import ByteMultiArray, Empty, Float64MultiArray, MultiArrayDimension
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import BagError, ConfigurationError
 from formation_gnc.recording import Bag, identical, read
 from formation_gnc.recording.decode import MessageType, installed_type
 from formation_gnc.recording.writer import BagWriter
@@ -78,6 +78,15 @@ def test_arrays_number_nested_messages_and_keep_text(bag_path, flight) -> None:
     assert bag.arrays("/events")["detail"].tolist() == [event.detail for event in events]
 
 
+def test_a_field_of_another_type_or_none_is_named(bag_path) -> None:
+    events = Bag(bag_path).arrays("/events")
+    assert events.integers("tick").tolist() == events["tick"].tolist()
+    with pytest.raises(BagError, match="topic /events: field detail is not of integers"):
+        events.integers("detail")
+    with pytest.raises(BagError, match="topic /events: no message has a field cause"):
+        events["cause"]
+
+
 def test_decoded_messages_have_the_fields_as_attributes(bag_path, flight) -> None:
     sent = [m.message for m in flight if m.topic == "/deputy1/thrust"]
     for (_, message, stamp), thrust in zip(Bag(bag_path).decoded(["/deputy1/thrust"]), sent, strict=True):
@@ -85,6 +94,7 @@ def test_decoded_messages_have_the_fields_as_attributes(bag_path, flight) -> Non
         assert stamp == thrust.header.stamp.sec * 10**9 + thrust.header.stamp.nanosec
 
 
+@settings(deadline=None)
 @given(
     st.lists(
         st.builds(
@@ -111,6 +121,7 @@ def test_arrays_equal_the_deserialization_of_ros(messages) -> None:
             assert np.array_equal(arrays[f"readings.{index}.values"][row], reading.values)
 
 
+@settings(deadline=None)
 @given(st.lists(st.builds(Event, node=text, subject=text, detail=text, tick=st.integers(0, 2**64 - 1)), min_size=1))
 def test_text_of_any_length_is_read_back(messages) -> None:
     arrays = installed_type("formation_gnc_msgs/msg/Event").arrays([serialize_message(m) for m in messages])
@@ -166,6 +177,7 @@ def test_bytes_that_do_not_fit_are_rejected(data) -> None:
         kind.message(data)
 
 
+@settings(deadline=None)
 @given(st.binary(max_size=120))
 def test_any_bytes_are_read_or_rejected(data) -> None:
     kind = installed_type("formation_gnc_msgs/msg/Truth")
