@@ -28,9 +28,6 @@ ROS = re.compile(
 
 EXCEPTIONS = {
     ("formation_gnc.common", "formation_gnc.orbit.constants"): "the Earth's MU, for the chief's mean motion",
-    ("formation_gnc.navigation.open_loop", "formation_gnc.analysis.metrics"): "becomes a replay of one module",
-    ("formation_gnc.navigation.open_loop", "formation_gnc.recording.reader"): "becomes a replay of one module",
-    ("formation_gnc.navigation.open_loop", "formation_gnc.recording.provenance"): "becomes a replay of one module",
     ("formation_gnc.recording.schema", "ament_index_python.packages"): "becomes an import where it is used",
 }
 """Imports, as (module, imported), that the rules forbid, each with its reason."""

@@ -31,7 +31,7 @@ call."""
 
 
 @kernel(_TICK, CACHE_KEY)
-def _propagate(
+def _propagate(  # noqa: C901 - one compiled loop nest: calls between kernels cost more than they explain
     states: Array,
     thrust: Array,
     masses: Array,
