@@ -133,7 +133,7 @@ def test_a_reader_is_not_led_astray_by_what_it_read_before(estimates: list[recor
         assert bits(from_cdr(records.Estimate, to_cdr(estimate))) == bits(estimate)
 
 
-def test_elements_that_trade_places_in_messages_of_one_length_are_told_apart() -> None:
+def test_swapped_lists_in_messages_of_one_length_are_told_apart() -> None:
     """Every count of the message itself is the same: only those in its elements differ."""
     one, other = (
         records.Estimate(
