@@ -6,7 +6,7 @@ import pytest
 from formation_gnc.flight import topics
 from formation_gnc.parameters import dump, leaves, load
 from tools.architecture import ROOT
-from tools.write_reference import COMMAND, PAGES, SCHEMAS, parameters_page
+from tools.write_reference import HOW_TO_WRITE, PAGES, SCHEMAS, parameters_page
 
 NEEDED = {
     "chief.semi_major_axis": 7.0e6,
@@ -17,7 +17,7 @@ NEEDED = {
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_generated_documentation_is_up_to_date(page: Path) -> None:
-    assert page.read_text() == PAGES[page](), f"run `{COMMAND}` and commit {page.relative_to(ROOT)}"
+    assert page.read_text() == PAGES[page](), f"run `{HOW_TO_WRITE}` and commit {page.relative_to(ROOT)}"
 
 
 @pytest.mark.parametrize("node", SCHEMAS)

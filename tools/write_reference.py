@@ -9,6 +9,9 @@ from typing import Any
 
 from formation_gnc.common import CommonParameters
 from formation_gnc.control.controller_manager import ControllerParameters
+from formation_gnc.flight import topics
+from formation_gnc.flight.graph import COMMAND, GRAPH, MODULES
+from formation_gnc.flight.topics import Topic
 from formation_gnc.guidance.parameters import GuidanceParameters
 from formation_gnc.navigation.navigation_filter import NavigationParameters
 from formation_gnc.parameters import Leaf, leaves
@@ -20,7 +23,8 @@ from formation_gnc.transport.markers import DisplayParameters
 from tools.architecture import FOUNDATION, PACKAGE, ROOT, WINGS, imports, place, wing
 
 DOCS = ROOT / "docs"
-COMMAND = "python -m tools.write_reference"
+MESSAGES = ROOT / "msg_defs" / "msg"
+HOW_TO_WRITE = "python -m tools.write_reference"
 
 SCHEMAS: dict[str, Any] = {
     "plant": PlantParameters,
@@ -36,7 +40,7 @@ SCHEMAS: dict[str, Any] = {
 INTRODUCTION = f"""\
 # Parameters
 
-<!-- Written by `{COMMAND}`: change the schemas, not this page. -->
+<!-- Written by `{HOW_TO_WRITE}`: change the schemas, not this page. -->
 
 Every parameter of every node, from the schemas that the nodes themselves check by. SI units and radians.
 
@@ -126,6 +130,92 @@ def _reduced(arrows: set[tuple[str, str]]) -> list[tuple[str, str]]:
     return sorted((a, c) for a, c in arrows if not any(a == d and (b, c) in reached for d, b in arrows - {(a, c)}))
 
 
+def tick_diagram() -> str:
+    """Mermaid sequence diagram of one deputy's tick: who gives what to whom, in the order of the graph table."""
+    lines = ["sequenceDiagram", *(f"  participant {name}" for name in ("plant", *MODULES, "recorder"))]
+    lines += [f"  plant->>{taker}: {topics.MEASUREMENT.name}" for taker in _takers(topics.MEASUREMENT)]
+    for row in GRAPH:
+        if row.takes_of_others:
+            names = ", ".join(each.topic.name for each in row.takes_of_others)
+            lines.append(f"  Note over {row.name}: in a fleet, also {names} of every other satellite")
+        for topic in row.gives:
+            arrow = "->>" if topic.every_tick else "-->>"
+            takers = [*_takers(topic), *(["plant"] if topic == COMMAND else [])]
+            lines += [f"  {row.name}{arrow}{taker}: {topic.name}" for taker in takers or ["recorder"]]
+    lines += ["  Note over plant: next tick when every deputy has answered or missed"]
+    return "\n".join(["```mermaid", *lines, "```"])
+
+
+def _takers(topic: Topic) -> list[str]:
+    return [row.name for row in GRAPH if topic in (each.topic for each in row.takes)]
+
+
+def nodes_table() -> str:
+    """Table of what every node subscribes to and publishes."""
+    of_every_deputy = "{} of every deputy"
+    rows = [
+        (
+            "/plant",
+            [of_every_deputy.format(_code(COMMAND)), _code(topics.PROGRESS)],
+            [
+                *map(_code, (topics.CLOCK, topics.TRUTH)),
+                of_every_deputy.format(_code(topics.MEASUREMENT)),
+                *map(_code, (topics.EVENTS, topics.DIAGNOSTICS)),
+            ],
+        )
+    ]
+    for row in GRAPH:
+        takes = [_code(each.topic) for each in row.takes]
+        takes += [f"in a fleet {_code(each.topic)} of every other deputy" for each in row.takes_of_others]
+        gives = [f"in a fleet {_code(topic)}" if topic.fleet_only else _code(topic) for topic in row.gives]
+        rows.append((row.name, takes, [*gives, *map(_code, (topics.TIMING, topics.EVENTS))]))
+    transforms = f"{_code(topics.TF)}, or {_code(topics.TRANSFORMS)} where tf2_msgs is not installed"
+    rows += [
+        (
+            "/display",
+            [_code(topics.TRUTH), of_every_deputy.format(_code(topics.TARGET))],
+            [_code(topics.MARKERS), transforms],
+        ),
+        ("/recorder", ["every topic there is, as raw bytes"], [_code(topics.PROGRESS)]),
+        (
+            "/replay",
+            [f"{_code(COMMAND)} of every deputy whose {_code(topics.MEASUREMENT)} it plays"],
+            ["the topics of a bag", _code(topics.CLOCK)],
+        ),
+    ]
+    lines = ["| node | subscribes to | publishes |", "|---|---|---|"]
+    return "\n".join(
+        [*lines, *(f"| `{name}` | {', '.join(takes)} | {', '.join(gives)} |" for name, takes, gives in rows)]
+    )
+
+
+def topics_table() -> str:
+    """Table of all topics: message, frame, when, contents."""
+    lines = ["| topic | message | frame | when | contents |", "|---|---|---|---|---|"]
+    for topic in (*topics.RUN_TOPICS, *topics.DEPUTY_TOPICS):
+        message, frame = (topic.record.message, topic.record.frame_id) if topic.record else (topic.message, "")
+        lines.append(f"| `{topic.name}` | {_linked(message)} | {frame} | {topic.when} | {topic.contents} |")
+    return "\n".join(lines)
+
+
+def _code(topic: Topic) -> str:
+    return f"`{topic.name}`"
+
+
+def _linked(message: str) -> str:
+    """A message with a link to its definition, and those of the messages that it is made of."""
+    if "/" in message:
+        return f"`{message}`"
+    definition = (MESSAGES / f"{message}.msg").read_text(encoding="utf-8")
+    ours = {path.stem for path in MESSAGES.glob("*.msg")}
+    parts = [name for name in re.findall(r"^(\w+)\[", definition, re.MULTILINE) if name in ours]
+    return " with ".join(
+        ", ".join(f"[`{name}`](../../msg_defs/msg/{name}.msg)" for name in names)
+        for names in ([message], list(dict.fromkeys(parts)))
+        if names
+    )
+
+
 def filled(page: Path, parts: dict[str, str]) -> str:
     """A written page with its generated parts renewed: what stands between `<!-- NAME: ... -->` and `<!-- end -->`."""
     text = page.read_text(encoding="utf-8")
@@ -139,11 +229,13 @@ def filled(page: Path, parts: dict[str, str]) -> str:
 
 
 ARCHITECTURE = DOCS / "architecture.md"
+TOPICS = DOCS / "reference" / "topics.md"
 
 PAGES: dict[Path, Callable[[], str]] = {
     DOCS / "reference" / "parameters.md": parameters_page,
     DOCS / "reference" / LAYOUT: lambda: foxglove_layout(["deputy1"]),
-    ARCHITECTURE: lambda: filled(ARCHITECTURE, {"wings": wings_diagram()}),
+    TOPICS: lambda: filled(TOPICS, {"nodes": nodes_table(), "topics": topics_table()}),
+    ARCHITECTURE: lambda: filled(ARCHITECTURE, {"wings": wings_diagram(), "tick": tick_diagram()}),
 }
 """Generated pages, or pages with generated parts, and what should stand in them."""
 
