@@ -82,7 +82,7 @@ def test_new_run_gets_no_record_of_the_previous_one(
         assert [fleet.take(topic, now) for topic in order] == [None, None, [now] * 3]
 
 
-def test_wires_hand_on_in_the_order_of_speech_and_to_the_last_listener_first() -> None:
+def test_the_bus_keeps_the_order_and_serves_the_last_subscriber_first() -> None:
     bus, heard = IntraProcessBus(), list[tuple[str, int]]()
     bus.advertise("estimate")
     bus.subscribe("estimate", lambda record: heard.append(("guidance", record)))

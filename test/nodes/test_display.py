@@ -31,7 +31,7 @@ def xyz(vector: object) -> list[float]:
     return [vector.x, vector.y, vector.z]  # type: ignore[attr-defined]
 
 
-def test_one_transform_after_the_other_leads_to_the_deputys_inertial_position(truth: Truth) -> None:
+def test_transforms_chain_to_the_inertial_position_of_the_deputy(truth: Truth) -> None:
     hill, *deputies = transforms(truth)
     assert (hill.header.frame_id, hill.child_frame_id) == ("inertial", "hill")
     assert (hill.header.stamp.sec, hill.header.stamp.nanosec) == (90, 500_000_000)
@@ -43,7 +43,7 @@ def test_one_transform_after_the_other_leads_to_the_deputys_inertial_position(tr
         assert place == pytest.approx(deputy.inertial_state[:3], abs=1e-6)
 
 
-def test_every_deputy_has_its_ball_name_and_trail_and_who_has_a_target_that_too(truth: Truth) -> None:
+def test_every_deputy_has_markers_and_a_target_where_there_is_one(truth: Truth) -> None:
     target = Target(TIME, "ring", np.array([1.0, 2.0, 3.0, 0.0, 0.0, 0.0]), 60 * NANOSECONDS, np.ones((4, 6)))
     past = np.array([0.0, -90.0, 30.0])
     drawn = list(markers(truth, {"deputy2": target}, {"deputy1": deque([past])}, 5.0))

@@ -24,7 +24,7 @@ def revolution() -> float:
     return math.tau / math.sqrt(MU / RADIUS**3)
 
 
-def test_in_the_suns_plane_the_night_is_as_long_as_a_cylinder_of_shadow_says(revolution: float) -> None:
+def test_eclipse_in_the_suns_plane_lasts_as_a_cylindrical_shadow_says(revolution: float) -> None:
     nights = eclipses(circular(0.4, 0.0), 3.0 * revolution, revolution / 180.0, EQUINOX)
     assert len(nights) == 3
     expected = revolution * math.asin(EARTH_RADIUS / RADIUS) / math.pi
@@ -53,7 +53,7 @@ def test_begin_and_end_are_where_the_plant_sees_them(revolution: float) -> None:
     assert np.all((bounds <= changes) & (bounds > changes - tick - 0.01))  # 1 ms, and 3 cm at 7.5 km/s
 
 
-def test_one_under_way_begins_now_and_one_that_outlasts_the_time_ends_with_it(
+def test_eclipses_are_clipped_to_the_forecast_window(
     revolution: float,
 ) -> None:
     inside = circular(0.4, math.pi)

@@ -64,7 +64,7 @@ def test_hill_axes_are_radial_along_track_and_normal(chief):
     assert hill_rate(chief) == pytest.approx(velocity[1] / radius)
 
 
-def test_relative_velocity_is_the_derivative_of_relative_position_on_keplerian_orbits():
+def test_relative_velocity_is_the_derivative_of_relative_position():
     """Without forces out of its plane the frame turns at h/r^2 alone: checked on the conic itself."""
     eccentricity, axis = 0.3, 1e7
     mean_motion = np.sqrt(MU / axis**3)

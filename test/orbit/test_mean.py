@@ -101,7 +101,7 @@ def test_transformation_inverts_in_every_singular_case(eccentricity, inclination
     assert np.linalg.norm((again - state)[3:]) < 1e-10
 
 
-def test_transformation_is_smooth_through_the_circular_and_equatorial_orbit():
+def test_transformation_is_smooth_at_circular_and_equatorial_orbits():
     """Neighbours a metre apart stay about a metre apart: nothing jumps where elements are singular."""
     circular = state_from_elements(Elements(7e6, 0.0, 0.0, 0.0, 0.0, 1.0))
     shift = mean_state(circular) - circular

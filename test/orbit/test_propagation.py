@@ -93,7 +93,7 @@ def test_satellites_do_not_feel_one_another():
         assert np.array_equal(alone[0], both[k])
 
 
-def test_forces_along_the_hill_axes_move_as_the_accelerations_that_they_are():
+def test_hill_frame_forces_equal_the_same_inertial_accelerations():
     states = np.array([state_from_elements(LEO), state_from_elements(ECCENTRIC)])
     forces, masses = np.array([[0.0, 0.0, 0.0], [0.01, -0.02, 0.03]]), np.array([100.0, 7.0])
     propagator, before = Propagator(30.0), states.copy()

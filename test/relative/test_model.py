@@ -75,7 +75,7 @@ def test_backwards_undoes_forwards(model: RelativeModel):
 
 
 @every_model
-def test_bounded_start_changes_the_along_track_rate_alone_and_does_not_drift(model: RelativeModel):
+def test_bounded_start_changes_only_the_along_track_rate(model: RelativeModel):
     start = model.bounded(0.0, STATE)
     np.testing.assert_array_equal(start[[0, 1, 2, 3, 5]], STATE[[0, 1, 2, 3, 5]])
 

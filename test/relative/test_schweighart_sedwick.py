@@ -157,7 +157,7 @@ def schweighart_sedwick_constants(reference, state):
     return q, growth
 
 
-def test_cross_track_extension_is_schweighart_and_sedwicks_where_theirs_is_defined():
+def test_cross_track_extension_equals_that_of_schweighart_and_sedwick():
     reference = CircularReference(7e6, math.radians(35.0))
     # Starting on the equator with z = -r sin i dO: the nodes of the two planes apart, and the inclinations.
     state = np.array([0.0, 0.0, 1000.0, 0.0, 0.0, 1.3])

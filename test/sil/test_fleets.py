@@ -60,7 +60,7 @@ def test_the_scenario_puts_four_on_four_places_with_one_change_each() -> None:
 
 
 @pytest.mark.sil
-def test_a_fleet_flies_the_same_bits_on_the_graph_composed_in_process_and_again(
+def test_a_fleet_has_the_same_bits_on_the_graph_composed_and_in_process(
     sil: Callable[..., Sil], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     document = yaml.safe_load(find_scenario("tetrahedral").read_text())
@@ -101,9 +101,7 @@ def test_a_fleet_flies_the_same_bits_on_the_graph_composed_in_process_and_again(
 
 
 @pytest.mark.sil
-def test_a_fleet_in_flight_is_told_of_another_formation_and_changes_at_one_tick(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_fleet_reconfigured_in_flight_changes_at_one_tick(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     guidance = {"assignment": "delta_v", "schedule": [], "reconfiguration_time": 3000.0}
     paced = {"duration": 600.0, "real_time_factor": 20.0}  # half a minute, for all to be told in
     scenario = load_scenario("tetrahedral", {"/plant": paced, "/**/guidance": guidance})

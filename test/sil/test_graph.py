@@ -84,7 +84,7 @@ def load() -> Iterator[None]:
         burner.wait()
 
 
-def test_two_rounds_of_laws_under_load_miss_no_tick_and_step_no_further_than_the_bound(desk: Desk, load: None) -> None:
+def test_law_swaps_under_load_miss_no_tick_and_keep_the_step_bound(desk: Desk, load: None) -> None:
     bag = desk.directory / "bag"
     desk.start("recorder", bag=bag)
     plant = desk.start("plant", duration=10_000.0, real_time_factor=100.0, wait_for_recorder=True)
@@ -127,7 +127,7 @@ def test_the_plant_waits_and_says_for_whom(desk: Desk) -> None:
     assert plant.wait() == 0, "the recorder can be left out"
 
 
-def test_a_node_killed_and_started_again_rejoins_and_the_log_shows_the_gap_and_replays(
+def test_a_restarted_node_rejoins_and_its_gap_is_logged_and_replays(
     desk: Desk, capsys: pytest.CaptureFixture[str]
 ) -> None:
     bag = desk.directory / "bag"
@@ -180,9 +180,7 @@ def test_graph_and_in_process_runner_agree_bit_for_bit(sil: StartSil, tmp_path: 
     assert bags[0].topics["/truth"].count == 600
 
 
-def test_every_nonlinear_law_flies_on_estimates_and_the_runner_agrees_bit_for_bit(
-    sil: StartSil, tmp_path: Path
-) -> None:
+def test_every_nonlinear_law_has_the_same_bits_on_graph_and_in_process(sil: StartSil, tmp_path: Path) -> None:
     """One after the other; the first with a final time flies its reconfiguration to the end, and holds."""
     laws = [name for name in ALGORITHMS if name not in ("coast", "lqr", "hinf", "mpc")]
     weights = {"position_error": [10.0] * 3, "velocity_error": [0.1] * 3, "thrust": [0.002] * 3}
@@ -252,7 +250,7 @@ def slowness() -> float:
     return (time.monotonic() - began[0]) / (time.process_time() - began[1])
 
 
-def test_interrupt_stops_everything_within_three_seconds_and_closes_the_bag(sil: StartSil) -> None:
+def test_interrupt_stops_all_within_three_seconds_and_closes_the_bag(sil: StartSil) -> None:
     run = sil("--real-time-factor", "200")
     run.wait_for_flight()
     children = run.children()

@@ -267,7 +267,7 @@ record(recorder)
 """
 
 
-def test_a_recorder_that_got_no_processor_hears_what_is_waiting_before_it_stops(desk: Desk) -> None:
+def test_a_starved_recorder_drains_its_queues_before_it_stops(desk: Desk) -> None:
     bag = desk.directory / "bag"
     run_in_process_of_its_own(IDLER, desk, bag)
     assert Bag(bag).topics[topics.EVENTS.name].count == 50

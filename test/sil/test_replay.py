@@ -41,9 +41,7 @@ def test_an_unchanged_replay_of_a_graph_run_gives_the_recorded_bits(
     assert identical(recorded, again, gnc_topics(recorded)) == []
 
 
-def test_nodes_started_again_in_flight_with_other_parameters_are_so_in_the_replay(
-    desk: Desk, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_nodes_restarted_with_other_parameters_replay_with_them(desk: Desk, capsys: pytest.CaptureFixture[str]) -> None:
     bag = desk.directory / "bag"
     plant, terminals = desk.take_off()
     otherwise = {

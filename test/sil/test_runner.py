@@ -99,9 +99,7 @@ def test_over_the_last_orbit_the_follower_is_where_it_is_to_be(flight: Records, 
     assert true_error.max() < 2.0
 
 
-def test_over_the_last_orbit_the_filter_errs_by_less_than_three_of_its_own_sigma(
-    flight: Records, last_orbit: slice
-) -> None:
+def test_estimation_error_over_the_last_orbit_is_within_three_sigma(flight: Records, last_orbit: slice) -> None:
     error = np.abs(estimated_states(flight) - true_states(flight)) / sigmas(flight)
     assert (error[last_orbit] < 3.0).all()
 
@@ -270,7 +268,7 @@ def test_mpc_keeps_out_of_the_way_of_the_others_of_its_fleet(radius: float, leas
     assert not [event for event in records["/events"] if event.kind == EventKind.FALLBACK]
 
 
-def test_a_deputy_without_an_estimate_misses_its_ticks_and_comes_back_with_a_fix(
+def test_a_deputy_without_an_estimate_misses_ticks_and_recovers_by_fix(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     run, records = Run(load_scenario("leader_follower")), Records()
@@ -304,7 +302,7 @@ if __name__ == "__main__":
         writer.writerows([f"{value:.12g}" for value in row.values()] for row in table)
 
 
-def test_a_satellite_without_an_estimate_costs_its_fleet_a_tick_as_on_the_graph(
+def test_a_satellite_without_an_estimate_costs_its_fleet_one_tick(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     run = Run(load_scenario("tetrahedral"))

@@ -124,7 +124,7 @@ def test_a_value_is_to_us_what_it_is_to_ros(
     assert (ours, type(ours)) == (value, type(value))
 
 
-def test_a_written_scenario_gives_every_node_all_its_parameters_through_ros(
+def test_a_written_scenario_gives_every_node_its_parameters_through_ros(
     tmp_path: Path, by_ros: Callable[[str, Path], dict[str, Any]]
 ) -> None:
     scenario = load_scenario("leader_follower", {"/**/guidance": {"preview_step": 1e-7}})

@@ -271,7 +271,7 @@ def constants(kind: Any) -> dict[str, Any]:
     return {name: getattr(kind, name) for name in dir(type(kind)) if name[0].isupper() and name.isupper()}
 
 
-def test_numbers_that_stand_for_something_stand_for_the_same_in_records_and_messages() -> None:
+def test_constants_of_records_equal_those_of_messages() -> None:
     assert constants(messages.Estimate) == {each.name: each.value for each in records.EstimateStatus}
     assert constants(messages.RejectionCount) == {each.name: each.value for each in records.Rejection}
     assert constants(messages.Event) == {each.name: each.value for each in records.EventKind}
