@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.transport.fields import Field, arguments, pack_times, reject_rows, reject_size, unpack_times
+from formation_gnc.transport.fields import Field, arguments, flatten, pack_times, reject_rows, reject_size, unpack_times
 from formation_gnc.transport.layout import LITTLE_ENDIAN, PackingLayout, UnpackingLayout
 
 PACKERS = 256
@@ -52,6 +52,7 @@ _NAMES: dict[str, Any] = {
     "asarray": np.asarray,
     "ndarray": np.ndarray,
     "batched": batched,
+    "flatten": flatten,
     "pack_times": pack_times,
     "unpack_times": unpack_times,
     "reject_rows": reject_rows,

@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import prod
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -145,9 +145,9 @@ def times(name: str, width: int) -> Field:
     def append_to(layout: Layout) -> None:
         layout.add("I", 2 * width * layout.count(), as_bytes=True)
 
-    prepare = f"_{name} = pack_times({name!r}, record.{name}, {width})"
-    count, result = f"len(_{name}) // {TIME.itemsize * width}", f"unpack_times(_{name}, {width})"
-    return _counted(name, append_to, prepare, count, f"_{name}", result)
+    prepare = f"_{name} = pack_times({name!r}, record.{name}, {width}) if len(record.{name}) else b''"
+    result = f"unpack_times(_{name}, {width}) if _{name} else ndarray((0, {width}), int64)"  # most are empty
+    return _counted(name, append_to, prepare, f"len(_{name}) // {TIME.itemsize * width}", f"_{name}", result)
 
 
 def records(name: str, record_type: type | None, fields: list[Field]) -> Field:
@@ -159,12 +159,13 @@ def records(name: str, record_type: type | None, fields: list[Field]) -> Field:
     targets = "".join(field.targets for field in fields)
     result = f"new_{name}({arguments(record_type, fields)})" if record_type else "None"
     values = f"batched(unpack_{name}(data), {targets.count(',')})"
+    flat = f"_{name}__counts, _{name}__values"
     return Field(
         name,
         append_to,
-        prepare=f"_{name} = [pack_{name}(each) for each in record.{name}]",
-        counts=f"len(_{name}), *[count for counts, _ in _{name} for count in counts],",
-        values=f"len(_{name}), *[value for _, values in _{name} for value in values],",
+        prepare=f"_{name} = record.{name}; {flat} = flatten(pack_{name}, _{name}) if _{name} else ((), ())",
+        counts=f"len(_{name}), *_{name}__counts,",
+        values=f"len(_{name}), *_{name}__values,",
         targets=f"_{name}__count,",
         count_targets=f"_{name}__count,",
         result=f"[{result} for {targets} in {values}] if _{name}__count else []",
@@ -181,11 +182,21 @@ def arguments(record_type: type, fields: Sequence[Field]) -> str:
     return ", ".join(results[field.name] for field in dataclasses.fields(record_type))
 
 
+def flatten[T](
+    pack: Callable[[T], tuple[tuple[int, ...], tuple[Any, ...]]], elements: Sequence[T]
+) -> tuple[list[int], list[Any]]:
+    """Counts and values of all elements of a list."""
+    counts, values = list[int](), list[Any]()
+    for each in elements:
+        own_counts, own_values = pack(each)
+        counts += own_counts
+        values += own_values
+    return counts, values
+
+
 def pack_times(name: str, given: Times, width: int) -> bytes:
     """Times (ns) as the bytes of Time messages; raises ValueError for others."""
     nanoseconds = np.asarray(given)
-    if not nanoseconds.size:
-        return b""
     if nanoseconds.dtype.kind != "i" or nanoseconds.shape[1:] != (width,):
         raise ValueError(f"{name}: {nanoseconds.dtype} of shape {nanoseconds.shape}, must be int64 (N, {width})")
     seconds, rest = np.divmod(nanoseconds, NANOSECONDS)
