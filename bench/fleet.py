@@ -24,7 +24,7 @@ DEPUTY_TICKS = 2400
 """Ticks of a flight, all its deputies together: a few seconds for one deputy as for eight."""
 
 FLEETS = {"one deputy": (1, False), "eight, each by itself": (8, False), "eight in touch": (8, True)}
-"""How many satellites, and whether they wait for one another's estimates and share places out."""
+"""How many satellites, and whether they wait for one another's estimates and assign slots."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Flight:
 
 @contextmanager
 def some_of(count: int, in_touch: bool) -> Iterator[Scenario]:
-    """The scenario with its first deputies only, who may share their places out."""
+    """The scenario with its first deputies only, which may be a fleet with assigned slots."""
     document = yaml.safe_load(find_scenario(SCENARIO).read_text())
     plant, guidance = document["/plant"][SECTION], document["/**/guidance"][SECTION]
     for name in plant["deputies"][count:]:
@@ -106,7 +106,7 @@ def fly(count: int, in_touch: bool) -> Flight:
     with some_of(count, in_touch) as scenario:
         last = fly_graph(scenario, LaunchOptions(composed=True), look, lambda _: None)
         alone = Run(scenario)
-        alone.tick(lambda topic, record: None)  # which shares places out
+        alone.tick(lambda topic, record: None)  # which assigns the slots
         started = process_time()
         alone.fly(lambda topic, record: None)
         arithmetic = (process_time() - started) / (alone.plant.tick - 1)

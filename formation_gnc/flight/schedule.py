@@ -6,7 +6,7 @@ from typing import Any
 
 import yaml
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import ParameterError
 from formation_gnc.parameters import read_yaml
 from formation_gnc.types import NANOSECONDS
 
@@ -27,7 +27,7 @@ def parse_schedule(entries: Sequence[str]) -> list[ScheduledChange]:
     """The changes of a schedule by time; entries of one time keep their order.
 
     Raises:
-        ConfigurationError: an entry is not of the form `{at: SECONDS, PARAMETER: VALUE, ...}`, or changes the
+        ParameterError: an entry is not of the form `{at: SECONDS, PARAMETER: VALUE, ...}`, or changes the
             schedule.
     """
     return sorted(map(_parse, entries), key=lambda change: change.time)
@@ -38,10 +38,10 @@ def _parse(entry: str) -> ScheduledChange:
         changes = read_yaml(entry)
         time = round(float(changes.pop("at")) * NANOSECONDS)
     except (yaml.YAMLError, AttributeError, KeyError, TypeError, ValueError, OverflowError):
-        raise ConfigurationError(
+        raise ParameterError(
             f"parameter schedule: {entry!r} is not allowed; "
             "it must be like '{at: 3000.0, algorithm: coast}' with the time in seconds"
         ) from None
     if "schedule" in changes:
-        raise ConfigurationError(f"parameter schedule: {entry!r} is not allowed; it must not change itself")
+        raise ParameterError(f"parameter schedule: {entry!r} is not allowed; it must not change itself")
     return ScheduledChange(entry, time, {str(name): value for name, value in changes.items()})

@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import ConfigurationError, ParameterError
 from formation_gnc.flight.module import FlightModule
 from formation_gnc.guidance.eclipse_forecast import EclipseForecast
 from formation_gnc.guidance.parameters import GuidanceParameters
@@ -49,13 +49,11 @@ class Guidance(FlightModule[GuidanceParameters, TargetPath]):
         """
         self._deputy = name.rpartition("/")[0].strip("/")
         if parameters.fleet and self._deputy not in parameters.fleet:
-            raise ConfigurationError(
+            raise ParameterError(
                 f"parameter fleet: {list(parameters.fleet)} is not allowed; {self._deputy} must be one of it"
             )
         if len(set(parameters.fleet)) != len(parameters.fleet):
-            raise ConfigurationError(
-                f"parameter fleet: {list(parameters.fleet)} is not allowed; no name may come twice"
-            )
+            raise ParameterError(f"parameter fleet: {list(parameters.fleet)} is not allowed; no name may come twice")
         self.neighbours = tuple(each for each in parameters.fleet if each != self._deputy)
         """The other satellites of the fleet."""
         super().__init__(name, parameters)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import ConfigurationError, ParameterError
 from formation_gnc.flight.module import Configuration, Plan
 from formation_gnc.guidance.parameters import GuidanceParameters
 from formation_gnc.guidance.targets import TargetPath
@@ -52,7 +52,7 @@ class ReconfigurationLock:
             if is_same_target(old, new, time):
                 continue
             if time < until:
-                raise ConfigurationError(
+                raise ParameterError(
                     f"parameter schedule: a change at {time / NANOSECONDS:g} s is not allowed; {_locked(until)}"
                 )
             until = _end(time, new.parameters.reconfiguration_time)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import ParameterError
 from formation_gnc.guidance.formation import FreeMotion
 from formation_gnc.parameters import parameter
 from formation_gnc.types import Vector
@@ -39,10 +39,10 @@ class SlotList(FreeMotion[SlotListParameters]):
 
     @classmethod
     def start(cls, parameters: SlotListParameters, mean_motion: float, slot: int) -> Vector:
-        """The state given for the slot; raises ConfigurationError for an empty list, or part of a state."""
+        """The state given for the slot; raises ParameterError for an empty list, or part of a state."""
         count = len(parameters.states)
         if count == 0 or count % 6:
-            raise ConfigurationError(
+            raise ParameterError(
                 f"parameter slot_list.states: {count} numbers are not allowed; it must be six for each slot"
             )
         return np.array(parameters.states[6 * slot : 6 * slot + 6])

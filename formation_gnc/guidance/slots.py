@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import ConfigurationError, ParameterError
 from formation_gnc.guidance.assignment import Assignment, assign_with_phase, fuel_weights, transfer_costs
 from formation_gnc.guidance.parameters import GuidanceParameters
 from formation_gnc.guidance.registry import FORMATIONS
@@ -44,7 +44,7 @@ def design_path(parameters: GuidanceParameters) -> TargetPath:
     """
     count = FORMATIONS[parameters.formation].slot_count(parameters.formation_parameters)
     if count is not None and parameters.slot >= count:
-        raise ConfigurationError(
+        raise ParameterError(
             f"parameter slot: {parameters.slot} is not allowed; it must be below {count}, "
             f"the slots of {parameters.formation}"
         )
@@ -72,15 +72,13 @@ def check_assignment(parameters: GuidanceParameters) -> None:
     """
     fleet, slots = len(parameters.fleet), slot_count(parameters)
     if not fleet:
-        raise ConfigurationError(
-            f"parameter assignment: {parameters.assignment} is not allowed without a fleet; name it"
-        )
+        raise ParameterError(f"parameter assignment: {parameters.assignment} is not allowed without a fleet; name it")
     if slots < fleet:
         raise ConfigurationError(
             f"formation {parameters.formation}: has {slots} of the {fleet} slots that the fleet needs"
         )
     if parameters.assignment == "fuel" and len(parameters.dry_masses) != fleet:
-        raise ConfigurationError(
+        raise ParameterError(
             f"parameter dry_masses: {list(parameters.dry_masses)} is not allowed; it must have one for each "
             f"of the fleet of {fleet}"
         )

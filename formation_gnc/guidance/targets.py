@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from formation_gnc.common import CommonParameters
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import ConfigurationError, OrbitError
 from formation_gnc.guidance.formation import Formation
 from formation_gnc.orbit.elements import (
     Elements,
@@ -60,7 +60,7 @@ class TargetPath(ABC):
         path. It covers linearisation, and an eccentricity that the model neglects.
 
         Raises:
-            ConfigurationError: the path starts on no orbit about the Earth.
+            OrbitError: the path starts on no orbit about the Earth.
         """
         chief = self._common.chief_elements
         inertial = state_from_elements(chief)
@@ -69,7 +69,7 @@ class TargetPath(ABC):
         try:
             deputy = elements_from_state(inertial_from_relative(inertial, path[0]))
         except ConfigurationError as reason:
-            raise ConfigurationError(f"this formation starts on no orbit about the Earth: {reason}") from None
+            raise OrbitError(f"this formation starts on no orbit about the Earth: {reason}") from None
         exact = np.array(
             [relative_from_inertial(_advanced(chief, float(t)), _advanced(deputy, float(t))) for t in times]
         )

@@ -6,7 +6,6 @@ from itertools import permutations
 import pytest
 
 from formation_gnc.flight.synchronizer import StampSynchronizer
-from formation_gnc.transport.bus import IntraProcessBus
 
 OWN, SECOND, THIRD = "estimate", "/deputy2/estimate", "/deputy3/estimate"
 
@@ -80,17 +79,3 @@ def test_new_run_gets_no_record_of_the_previous_one(
     for time in (0, 10, 20, 30):
         now = At(time, run=2)
         assert [fleet.take(topic, now) for topic in order] == [None, None, [now] * 3]
-
-
-def test_the_bus_keeps_the_order_and_serves_the_last_subscriber_first() -> None:
-    bus, heard = IntraProcessBus(), list[tuple[str, int]]()
-    bus.advertise("estimate")
-    bus.subscribe("estimate", lambda record: heard.append(("guidance", record)))
-    bus.subscribe("estimate", lambda record: heard.append(("controller", record)))
-    assert "estimate" in bus
-    assert "target" not in bus
-    bus.publish("estimate", 1)
-    bus.publish("estimate", 2)
-    assert heard == []
-    bus.deliver()
-    assert heard == [("controller", 1), ("guidance", 1), ("controller", 2), ("guidance", 2)]

@@ -24,7 +24,7 @@ CHANGE = 8890
 
 @pytest.mark.slow  # six orbits of four satellites: a minute or two; eight on longer ticks: half a minute
 @pytest.mark.parametrize(("scenario", "tick"), [("tetrahedral", 1.0), ("projected_circle", 10.0)])
-def test_all_arrive_and_none_comes_near_another(scenario: str, tick: float) -> None:
+def test_fleet_arrives_in_formation_and_keeps_its_separation(scenario: str, tick: float) -> None:
     run = Run(load_scenario(scenario, {"/**": {"tick": tick}}))
     truths: list[Truth] = []
     targets: dict[str, list[np.ndarray]] = {name: [] for name in run.plant.parameters.deputies}
@@ -48,11 +48,11 @@ def test_all_arrive_and_none_comes_near_another(scenario: str, tick: float) -> N
         assert off[-round(5926 / tick) :].max() < 5.0
     nearest = minimum_separation(np.arange(len(truths)), positions, list(targets))
     assert nearest is not None
-    assert nearest.distance > 300.0  # measured: 338 m and 341 m, on the way
+    assert nearest.distance > 300.0  # measured: 338 m and 341 m, in transit
     assert [event.kind for event in events].count(EventKind.RECONFIGURATION) == len(targets)
 
 
-def test_the_scenario_puts_four_on_four_places_with_one_change_each() -> None:
+def test_scenario_has_four_satellites_in_four_slots_with_one_change() -> None:
     scenario = load_scenario("tetrahedral")
     guidances = [setup["guidance"] for setup in scenario.deputies.values()]
     assert [guidance.slot for guidance in guidances] == [0, 1, 2, 3]
@@ -60,7 +60,7 @@ def test_the_scenario_puts_four_on_four_places_with_one_change_each() -> None:
 
 
 @pytest.mark.sil
-def test_a_fleet_has_the_same_bits_on_the_graph_composed_and_in_process(
+def test_fleet_has_equal_bits_on_graph_composed_in_process_and_replayed(
     sil: Callable[..., Sil], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     document = yaml.safe_load(find_scenario("tetrahedral").read_text())
@@ -86,14 +86,14 @@ def test_a_fleet_has_the_same_bits_on_the_graph_composed_and_in_process(
         assert identical(graph, bags[other], topics) == []
     events = graph.arrays("/events")
     kinds = events["kind"].tolist()
-    assert kinds.count(EventKind.ASSIGNMENT) == 8  # at the start and at the change, by each for itself
+    assert kinds.count(EventKind.ASSIGNMENT) == 8  # by each guidance, at the start and at the change
     assert kinds.count(EventKind.RECONFIGURATION) == 4
-    places = [
+    slots = [
         detail.split("slot ")[1].split(",")[0]
         for detail, kind, tick in zip(events["detail"].tolist(), kinds, events["tick"].tolist(), strict=True)
         if kind == EventKind.ASSIGNMENT and tick == 40
     ]
-    assert sorted(places) == ["0", "1", "2", "3"]
+    assert sorted(slots) == ["0", "1", "2", "3"]
     assert graph.arrays("/deputy1/target")["neighbours.2.velocity"].shape == (120, 3)
     assert main(["replay", str(graph.path), "--bag", str(tmp_path / "again")]) == 0
     assert capsys.readouterr().out.splitlines()[-1] == "identical on every GNC topic"
@@ -101,9 +101,11 @@ def test_a_fleet_has_the_same_bits_on_the_graph_composed_and_in_process(
 
 
 @pytest.mark.sil
-def test_a_fleet_reconfigured_in_flight_changes_at_one_tick(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_fleet_commanded_in_flight_changes_formation_at_one_tick(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     guidance = {"assignment": "delta_v", "schedule": [], "reconfiguration_time": 3000.0}
-    paced = {"duration": 600.0, "real_time_factor": 20.0}  # half a minute, for all to be told in
+    paced = {"duration": 600.0, "real_time_factor": 20.0}  # half a minute of wall time to set all schedules
     scenario = load_scenario("tetrahedral", {"/plant": paced, "/**/guidance": guidance})
     at = 500
     order = [f"{{at: {at}.0, formation: three_in_plane_one_out}}"]
@@ -132,13 +134,13 @@ def test_a_fleet_reconfigured_in_flight_changes_at_one_tick(tmp_path: Path, caps
     events = bag.arrays("/events")
     kinds = list(zip(events["kind"].tolist(), events["tick"].tolist(), strict=True))
     assert kinds.count((EventKind.ASSIGNMENT, at)) == 4
-    # what was told in flight is flown again at its tick
+    # a schedule set in flight replays at its tick
     assert main(["replay", str(bag.path), "--bag", str(tmp_path / "again")]) == 0
     assert capsys.readouterr().out.splitlines()[-1] == "identical on every GNC topic"
 
 
 @pytest.mark.sil
-def test_eight_fly_composed_to_the_bits_of_the_runner_without_a_miss(sil: Callable[..., Sil], tmp_path: Path) -> None:
+def test_eight_composed_have_the_bits_of_the_runner_without_a_miss(sil: Callable[..., Sil], tmp_path: Path) -> None:
     bags = []
     for way in ("--composed", "--in-process"):
         run = sil("--duration", "60", way, directory=tmp_path / way.strip("-"), scenario="projected_circle")
@@ -154,7 +156,7 @@ def test_eight_fly_composed_to_the_bits_of_the_runner_without_a_miss(sil: Callab
 
 
 @pytest.mark.sil
-def test_the_display_draws_the_fleet_while_it_flies(sil: Callable[..., Sil]) -> None:
+def test_display_draws_the_fleet_in_flight(sil: Callable[..., Sil]) -> None:
     run = sil("--composed", "--display", "--duration", "900", "--real-time-factor", "200", scenario="tetrahedral")
     status, _, errors = run.finish()
     assert status == 0, errors
