@@ -334,7 +334,7 @@ def sound(state: Array, covariance: Array) -> bool:
 
 
 @kernel((_MATRIX,))
-def settle(covariance: Array) -> None:
+def settle(covariance: Array) -> None:  # noqa: C901 - one Cholesky factorisation, in loops
     """Make a covariance symmetric, and positive definite if rounding has taken that from it; what is not a
     number stays so."""
     size = covariance.shape[0]
