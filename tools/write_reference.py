@@ -10,7 +10,7 @@ from typing import Any
 from formation_gnc.common import CommonParameters
 from formation_gnc.control.controller_manager import ControllerParameters
 from formation_gnc.guidance.parameters import GuidanceParameters
-from formation_gnc.navigation.navigation_filter import NavigationParameters
+from formation_gnc.navigation.parameters import NavigationParameters
 from formation_gnc.parameters import Leaf, leaves
 from formation_gnc.plant.plant import PlantParameters
 from formation_gnc.recording.layout import LAYOUT, foxglove_layout
