@@ -44,9 +44,7 @@ def run() -> list[Result]:
     """
     parameters = NavigationParameters(chief=Orbit(6978100.0, inclination=radians(50.0)), tick=1.0)
     samples = [each.measurement for each in simulate_measurements(parameters, 600, np.random.default_rng(1))]
-    every_tenth = [
-        each if index % 10 == 0 else replace(each, readings=[]) for index, each in enumerate(samples)
-    ]
+    every_tenth = [each if index % 10 == 0 else replace(each, readings=[]) for index, each in enumerate(samples)]
     noise, no_noise = process_noise(1e-14, 1.0), np.zeros((6, 6))
     covariance = np.diag(np.repeat([0.25, 2.5e-7], 3))
     model, variance = measurement_model(("radius", "range_rate", "latitude")), np.array([25.0, 1e-4, 1e-12])
@@ -78,10 +76,9 @@ def run() -> list[Result]:
             begun = perf_counter()
             filter.predict(process, interval, noise)
             if measurement.readings:
+                values = np.array([each.values[0] for each in measurement.readings])
                 chief = interval.next_chief
-                filter.linearize(
-                    Readings(model, np.array([each.values[0] for each in measurement.readings]), [0.0] * 3, variance, chief, history, late=False)
-                )
+                filter.linearize(Readings(model, values, [0.0] * 3, variance, chief, history, late=False))
                 filter.update(pseudo=False)
             times[index] = perf_counter() - begun
         return times

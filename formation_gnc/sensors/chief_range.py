@@ -1,7 +1,7 @@
 """Chief range: distance to the chief."""
 
 from formation_gnc.sensors.norm import norm
-from formation_gnc.sensors.sensor import Axis, Sensor, State
+from formation_gnc.sensors.sensor import DisplayUnit, Sensor, State
 from formation_gnc.types import Matrix, Vector
 
 
@@ -25,7 +25,7 @@ CHIEF_RANGE = Sensor(
     differentiate=differentiate,
     sigma=(1.0,),
     sigma_range=(1e-6, 1e9),
-    readings=Axis("m"),
-    innovations=Axis("m"),
+    reading_unit=DisplayUnit("m"),
+    innovation_unit=DisplayUnit("m"),
     on=False,
 )

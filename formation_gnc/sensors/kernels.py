@@ -1,6 +1,8 @@
 """Measurement functions of several sensors at once, compiled."""
 
+import inspect
 from collections.abc import Callable
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +22,18 @@ CODES = {name: code for code, name in enumerate(sensors())}
 CODE_ARRAY = NumbaArray(int64, 1, "A", readonly=True)
 """Numba type of an array of codes."""
 
-OTHER_SOURCES = tuple(
-    sensor.source for sensor in sensors().values() if Path(__file__).resolve().parent not in sensor.source.parents
-)
-"""Files of sensors from outside the package, for the cache key of kernels that measure."""
+
+def _cache_key() -> str:
+    """Digest of the registry: its names in order, and the files of its sensors."""
+    digest = sha256()
+    for sensor in sensors().values():
+        digest.update(sensor.name.encode())
+        digest.update(Path(inspect.getfile(sensor.measure)).read_bytes())
+    return digest.hexdigest()
+
+
+CACHE_KEY = _cache_key()
+"""For kernels that measure: registered sensors may come from outside the package."""
 
 _SIZES = np.array([sensor.size for sensor in sensors().values()])
 
@@ -70,7 +80,7 @@ def measure_all(codes: NDArray[np.int64], deputy: Vector, chief: Vector) -> tupl
     return values, jacobian
 
 
-@kernel((CODE_ARRAY, ANY_VECTOR, ANY_VECTOR), OTHER_SOURCES)
+@kernel((CODE_ARRAY, ANY_VECTOR, ANY_VECTOR), CACHE_KEY)
 def measure(codes: NDArray[np.int64], deputy: Vector, chief: Vector) -> tuple[Vector, Matrix]:
     """Readings without noise and their Jacobian.
 

@@ -3,7 +3,7 @@
 from math import atan2, degrees, sqrt
 
 from formation_gnc.sensors.norm import norm
-from formation_gnc.sensors.sensor import Axis, Sensor, State
+from formation_gnc.sensors.sensor import DisplayUnit, Sensor, State
 from formation_gnc.types import Matrix, Vector
 
 
@@ -30,6 +30,6 @@ LATITUDE = Sensor(
     differentiate=differentiate,
     sigma=(1e-6,),
     sigma_range=(1e-12, 10.0),
-    readings=Axis("deg", degrees(1.0)),
-    innovations=Axis("µrad", 1e6),
+    reading_unit=DisplayUnit("deg", degrees(1.0)),
+    innovation_unit=DisplayUnit("µrad", 1e6),
 )

@@ -2,7 +2,7 @@
 
 from math import sqrt
 
-from formation_gnc.sensors.sensor import Axis, Sensor, State
+from formation_gnc.sensors.sensor import DisplayUnit, Sensor, State
 from formation_gnc.types import Matrix, Vector
 
 
@@ -27,6 +27,6 @@ RADIUS = Sensor(
     differentiate=differentiate,
     sigma=(5.0,),
     sigma_range=(1e-6, 1e9),
-    readings=Axis("km", 1e-3),
-    innovations=Axis("m"),
+    reading_unit=DisplayUnit("km", 1e-3),
+    innovation_unit=DisplayUnit("m"),
 )

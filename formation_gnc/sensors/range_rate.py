@@ -2,7 +2,7 @@
 
 from math import sqrt
 
-from formation_gnc.sensors.sensor import Axis, Sensor, State
+from formation_gnc.sensors.sensor import DisplayUnit, Sensor, State
 from formation_gnc.types import Matrix, Vector
 
 
@@ -31,6 +31,6 @@ RANGE_RATE = Sensor(
     differentiate=differentiate,
     sigma=(0.01,),
     sigma_range=(1e-9, 1e6),
-    readings=Axis("m/s"),
-    innovations=Axis("m/s"),
+    reading_unit=DisplayUnit("m/s"),
+    innovation_unit=DisplayUnit("m/s"),
 )

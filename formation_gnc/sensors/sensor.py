@@ -1,9 +1,7 @@
 """Description of a sensor: one object that plant, filter, parameters and plots are made from."""
 
-import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from formation_gnc.errors import ConfigurationError
@@ -15,10 +13,10 @@ type State = Sequence[float] | Vector
 
 
 @dataclass(frozen=True, slots=True)
-class Axis:
-    """Unit that values are drawn in, and its factor from the sensor's own unit."""
+class DisplayUnit:
+    """Unit of plots, and its factor from the sensor's own unit."""
 
-    unit: str
+    name: str
     factor: float = 1.0
 
 
@@ -46,8 +44,8 @@ class Sensor:
     """Default standard deviation of the noise of each value."""
     sigma_range: tuple[float, float]
     """Least and greatest standard deviation that the filter accepts."""
-    readings: Axis
-    innovations: Axis
+    reading_unit: DisplayUnit
+    innovation_unit: DisplayUnit
     on: bool = True
     """Whether a deputy has it by default."""
     labels: tuple[str, ...] = ("",)
@@ -68,11 +66,6 @@ class Sensor:
     def size(self) -> int:
         """Number of values of a reading."""
         return len(self.labels)
-
-    @property
-    def source(self) -> Path:
-        """File of the measurement function."""
-        return Path(inspect.getfile(self.measure)).resolve()
 
     def declare(self, default: Sequence[float], **limits: Any) -> tuple[Any, Any]:
         """Type and field of a parameter with one number for each value of a reading."""

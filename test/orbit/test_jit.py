@@ -24,8 +24,7 @@ print(twice(21.0), len(twice.stats.cache_hits))
 """
 
 
-directory = jit._cache_directory.__wrapped__
-"""Without its memory."""
+directory = jit._cache_directory
 
 
 @pytest.fixture
@@ -76,13 +75,8 @@ def test_cache_changes_with_any_source(roots, monkeypatch, tmp_path, folder, sou
     assert directory(folder) != before
 
 
-def test_cache_changes_with_a_source_outside_the_package(roots, tmp_path):
-    source = tmp_path / "sextant.py"
-    source.write_text("SCALE = 1.0\n")
-    before = directory("sensors", (source,))
-    assert before != directory("sensors")
-    source.write_text("SCALE = 2.0\n")
-    assert directory("sensors", (source,)) != before
+def test_cache_changes_with_the_key_of_what_comes_from_outside(roots):
+    assert len({directory("sensors"), directory("sensors", "a star tracker"), directory("sensors", "another")}) == 3
 
 
 def test_kernels_are_built_from_the_folders_of_their_cache_key():
