@@ -12,7 +12,7 @@ import difflib
 import json
 import math
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass
 from typing import Any, get_args, get_origin, get_type_hints
 
@@ -91,6 +91,20 @@ def per_entry(registry: Mapping[str, Any]) -> Any:
         default_factory=lambda: {name: entry.Parameters() for name, entry in registry.items()},
         metadata={"registry": registry},
     )
+
+
+def with_fields[T](more: Iterable[tuple[str, Any, Any]]) -> Callable[[type[T]], type[T]]:
+    """Declare more fields of a schema, below ``@dataclass``: name, type and value, such as :func:`parameter`."""
+
+    def extend(schema: type[T]) -> type[T]:
+        for name, kind, value in more:
+            if hasattr(schema, name):
+                raise ParameterError(f"parameter {name}: {schema.__name__} has another one of this name")
+            schema.__annotations__[name] = kind
+            setattr(schema, name, value)
+        return schema
+
+    return extend
 
 
 @dataclass(frozen=True)

@@ -26,16 +26,6 @@ class Record:
     """Frame named in the message's header."""
 
 
-class Sensor(IntEnum):
-    """What a reading measures."""
-
-    RADIUS = 0
-    RANGE_RATE = 1
-    LATITUDE = 2
-    RIGHT_ASCENSION = 3
-    CHIEF_RANGE = 4
-
-
 class EstimateStatus(IntEnum):
     """State of the filter; the constants of Estimate.msg."""
 

@@ -13,7 +13,7 @@ from formation_gnc.flight import topics
 from formation_gnc.flight.graph import COMMAND, GRAPH, MODULES
 from formation_gnc.flight.topics import Topic
 from formation_gnc.guidance.parameters import GuidanceParameters
-from formation_gnc.navigation.navigation_filter import NavigationParameters
+from formation_gnc.navigation.parameters import NavigationParameters
 from formation_gnc.parameters import Leaf, leaves
 from formation_gnc.plant.plant import PlantParameters
 from formation_gnc.recording.layout import LAYOUT, foxglove_layout

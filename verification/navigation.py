@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from formation_gnc.common import Orbit
-from formation_gnc.navigation import kernels
-from formation_gnc.navigation.measurement import NAMES
-from formation_gnc.navigation.navigation_filter import NavigationParameters
+from formation_gnc.navigation.kernels.measurement import measure_relative
+from formation_gnc.navigation.measurement import measurement_model
 from formation_gnc.navigation.observability import orbit_period, predicted_unobservable_direction
+from formation_gnc.navigation.parameters import NavigationParameters
 from formation_gnc.navigation.process import Interval, NonlinearProcess, process_noise, substeps
 from formation_gnc.orbit.frames import hill_transform
-from formation_gnc.records import Estimate, EstimateStatus, Measurement, Rejection, Sensor
-from formation_gnc.sil.monte_carlo import START, Sample, navigator, nees, simulate_measurements
+from formation_gnc.records import Estimate, EstimateStatus, Measurement, Rejection
+from formation_gnc.sil.monte_carlo import START, Sample, navigation_filter, nees, simulate_measurements
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
 from verification.figure import Figure, failures
@@ -76,7 +76,7 @@ class Campaign:
 
 
 def campaign(parameters: NavigationParameters, ticks: int, runs: int, start: Array = START) -> Campaign:
-    """Fly `runs` independent truths, as uncertain as the parameters say, through the navigator."""
+    """Fly `runs` independent truths, as uncertain as the parameters say, through the filter."""
     count = len(parameters.sensors)
     error, sigma = np.empty((runs, ticks, 6)), np.empty((ticks, 6))
     squared, nis, innovation = (
@@ -86,7 +86,7 @@ def campaign(parameters: NavigationParameters, ticks: int, runs: int, start: Arr
     )
     rejected = 0
     for run in range(runs):
-        filter = navigator(parameters)
+        filter = navigation_filter(parameters)
         for tick, sample in enumerate(
             simulate_measurements(parameters, ticks, np.random.default_rng([4, run]), start=start)
         ):
@@ -114,16 +114,17 @@ def cramer_rao(parameters: NavigationParameters, ticks: int) -> Array:
     covariance = np.diag(np.repeat([parameters.fix_position_sigma**2, parameters.fix_velocity_sigma**2], 3))
     noise = process_noise(parameters.acceleration_density, parameters.tick)
     process = NonlinearProcess()
-    sensors = np.array([int(sensor) for sensor in Sensor if NAMES[sensor] in parameters.sensors])
-    sigmas = np.array([getattr(parameters, f"{NAMES[Sensor(sensor)]}_sigma") for sensor in sensors])
+    codes = measurement_model(tuple(parameters.sigmas)).codes
+    sigmas = np.concatenate(list(parameters.sigmas.values()))
     bound = np.empty((ticks, 6))
     last: Sample | None = None
     for tick, sample in enumerate(simulate_measurements(still, ticks, np.random.default_rng(0))):
         chief = sample.measurement.chief_state
         if last is not None:
-            leg = Interval(last.measurement.chief_state, chief, np.zeros(3), parameters.tick, substeps(parameters.tick))
-            covariance = process.predict(leg, last.truth, covariance, noise)[1]
-        rows = kernels.read_relative(sensors, chief, sample.truth)[1] / sigmas[:, None]
+            start, step = last.measurement.chief_state, parameters.tick
+            interval = Interval(start, chief, np.zeros(3), step, substeps(step))
+            covariance = process.predict(interval, last.truth, covariance, noise)[1]
+        rows = measure_relative(codes, chief, sample.truth)[1] / sigmas[:, None]
         gain = covariance @ rows.T @ np.linalg.inv(rows @ covariance @ rows.T + np.eye(len(rows)))
         keep = np.eye(6) - gain @ rows
         covariance = keep @ covariance @ keep.T + gain @ gain.T
@@ -307,7 +308,7 @@ def neokleous(directory: Path) -> tuple[str, list[Figure]]:
     """Figs. 3.3 to 3.6: measured and estimated x, y, z and radius at GEO, with his pseudo-measurements."""
     parameters = NavigationParameters(chief=GEO, tick=6.0, pseudo_measurements=True, acceleration_density=1e-14, **WIDE)
     start = np.array([500.0, 1000.0, 300.0, 0.0, -2.0 * 7.292e-5 * 500.0, 0.0])
-    filter = navigator(parameters)
+    filter = navigation_filter(parameters)
     truth, state, sigma, radius = [], [], [], []
     for sample in simulate_measurements(parameters, 10000, np.random.default_rng(33), start=start):
         estimate = filter.on_tick(sample.measurement)
@@ -316,7 +317,7 @@ def neokleous(directory: Path) -> tuple[str, list[Figure]]:
         state.append(estimate.relative_state)
         sigma.append(np.sqrt(np.diag(estimate.covariance)))
         expected = [
-            kernels.read_relative(np.array([0]), estimate.chief_state, each)[0][0]
+            measure_relative(measurement_model(("radius",)).codes, estimate.chief_state, each)[0][0]
             for each in (sample.truth, estimate.relative_state)
         ]
         radius.append([sample.measurement.readings[0].values[0], *expected])
@@ -428,7 +429,7 @@ def fourth_sensors() -> tuple[str, list[Figure]]:
     for name, changes in variants.items():
         errors, squares = [], []
         for run in range(10):
-            filter = navigator(replace(truth, **changes))
+            filter = navigation_filter(replace(truth, **changes))
             for tick, sample in enumerate(simulate_measurements(truth, 400, np.random.default_rng([6, run]))):
                 estimate = filter.on_tick(sample.measurement)
                 assert estimate is not None
@@ -470,7 +471,7 @@ def troubles(directory: Path) -> tuple[str, list[Figure]]:
     within, squares, after = [], [], []
     for run in range(20):
         rng = np.random.default_rng([5, run])
-        filter = navigator(parameters)
+        filter = navigation_filter(parameters)
         error, sigma = np.empty((ticks, 6)), np.empty((ticks, 6))
         for tick, sample in enumerate(simulate_measurements(parameters, ticks, np.random.default_rng([7, run]))):
             spoilt, outliers = _spoil(sample.measurement, parameters, rng, outage.start <= tick < outage.stop)
@@ -525,9 +526,8 @@ def _spoil(
         if lost < 0.3 or outage:
             continue
         if stray < 0.01:
-            size = 50.0 * getattr(parameters, f"{reading.sensor}_sigma")
-            (value,) = reading.values
-            reading = replace(reading, values=[value + (size if side < 0.5 else -size)])
+            (sigma,), (value,) = parameters.sigmas[reading.sensor], reading.values
+            reading = replace(reading, values=[value + (50.0 * sigma if side < 0.5 else -50.0 * sigma)])
             outliers += 1
         readings.append(reading)
     return replace(measurement, readings=readings), outliers

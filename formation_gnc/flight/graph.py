@@ -16,7 +16,8 @@ from formation_gnc.flight.synchronizer import StampSynchronizer
 from formation_gnc.flight.topics import Topic
 from formation_gnc.guidance.guidance import Guidance
 from formation_gnc.guidance.parameters import GuidanceParameters
-from formation_gnc.navigation.navigation_filter import NavigationFilter, NavigationParameters
+from formation_gnc.navigation.navigation_filter import NavigationFilter
+from formation_gnc.navigation.parameters import NavigationParameters
 from formation_gnc.records import Event, NavigationState
 
 

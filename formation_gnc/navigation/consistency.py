@@ -1,4 +1,4 @@
-"""Whether the filter still agrees with its readings."""
+"""Consistency of the filter with its readings."""
 
 from collections import deque
 from enum import Enum
@@ -7,34 +7,31 @@ from functools import cache
 from scipy.stats import chi2
 
 WINDOW = 20
-"""Updates over which the normalised innovations are summed."""
+"""Updates over which normalised innovations squared (NIS) are summed."""
 
 FALSE_ALARM = 1e-7
-"""Probability that a consistent filter is called diverged by one window."""
+"""Probability that one window of a consistent filter counts as divergence."""
 
 INFLATION = 10.0
-"""By which the covariance is multiplied when the gates reject most readings, again and again until they
-open."""
+"""Factor on the covariance at each update at which the gates reject most readings."""
 
 UPDATES_TO_DIVERGE = 5
-"""Updates in a row in which the gates reject most readings, after which the covariance is inflated."""
+"""Consecutive updates at which the gates reject most readings, from which on the covariance is inflated."""
 
 INFLATIONS = 6
-"""Inflations in a row after which the state is given up: the standard deviation is then a thousand times
-what it was."""
+"""Consecutive inflations after which the state is lost: a thousand times the standard deviation did not help."""
 
 
 class Verdict(Enum):
-    """What is to be done."""
+    """Consequence of an update."""
 
-    FINE = "fine"
+    CONSISTENT = "consistent"
     INFLATE = "inflate"
     GIVE_UP = "give up"
 
 
 class Consistency:
-    """Detects divergence in two ways: readings rejected by the gates, and those taken being too far off in
-    sum."""
+    """Detects divergence: gates that reject most readings, or a sum of NIS beyond chi-square."""
 
     def __init__(self) -> None:
         """Without a history."""
@@ -42,34 +39,34 @@ class Consistency:
         self._freedom: deque[int] = deque(maxlen=WINDOW)
         self._rejected = 0
 
-    def judge(self, nis: float, taken: int, rejected: int) -> tuple[Verdict, float]:
-        """After an update.
+    def judge(self, nis: float, used: int, rejected: int) -> tuple[Verdict, float]:
+        """Judge an update.
 
         Args:
-            nis: normalised innovation squared of the readings taken.
-            taken: how many these are.
-            rejected: how many the gates rejected.
+            nis: normalised innovation squared of the values used.
+            used: number of these, the degrees of freedom of their NIS.
+            rejected: number of values rejected by the gates.
 
         Returns:
-            What is to be done, and by which factor to inflate the covariance.
+            The verdict, and the factor by which to inflate the covariance.
         """
-        if rejected > taken:
+        if rejected > used:
             self._rejected += 1
             inflations = self._rejected - UPDATES_TO_DIVERGE
             if inflations < 0:
-                return Verdict.FINE, 1.0
+                return Verdict.CONSISTENT, 1.0
             return (Verdict.GIVE_UP if inflations >= INFLATIONS else Verdict.INFLATE), INFLATION
         self._rejected = 0
         self._nis.append(nis)
-        self._freedom.append(taken)
+        self._freedom.append(used)
         total, freedom = sum(self._nis), sum(self._freedom)
-        if len(self._nis) < WINDOW or total <= _bound(freedom):
-            return Verdict.FINE, 1.0
+        if len(self._nis) < WINDOW or total <= _largest_nis(freedom):
+            return Verdict.CONSISTENT, 1.0
         self._nis.clear()
         self._freedom.clear()
         return Verdict.INFLATE, total / freedom
 
 
 @cache
-def _bound(freedom: int) -> float:
+def _largest_nis(freedom: int) -> float:
     return float(chi2.isf(FALSE_ALARM, freedom))

@@ -1,149 +1,109 @@
-"""What the sensors should read, how that changes with the state, and readings that come late."""
+"""Measurement model: the readings of a tick, stacked, and what they are expected to be."""
 
-from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import accumulate, pairwise
 from math import pi
 
 import numpy as np
+from numpy.typing import NDArray
 
-from formation_gnc.navigation import kernels
-from formation_gnc.navigation.process import Interval, substeps
-from formation_gnc.orbit.frames import hill_rotation, hill_transform_inverse, inertial_from_relative
-from formation_gnc.orbit.propagation import advance_with_transition
-from formation_gnc.records import Sensor
+from formation_gnc.navigation.kernels import motion
+from formation_gnc.navigation.kernels.measurement import measure_relative
+from formation_gnc.navigation.process import substeps
+from formation_gnc.navigation.state_history import StateHistory
+from formation_gnc.orbit.frames import hill_transform_inverse, inertial_from_relative
+from formation_gnc.sensors.kernels import CODES, measure
+from formation_gnc.sensors.registry import sensors
 from formation_gnc.types import Matrix, Vector
 
-NAMES = {sensor: sensor.name.lower() for sensor in Sensor}
-"""Sensors as parameters and events call them."""
-
-_RIGHT_ASCENSION = int(Sensor.RIGHT_ASCENSION)
-
-_AT_REST = np.zeros(3)
-
-
-class StateHistory:
-    """The legs last flown, so that the deputy can be followed back to when a late reading was taken."""
-
-    def __init__(self, longest: int, earlier: "StateHistory | None" = None) -> None:
-        """Remember at most so many legs, starting with those of an earlier track."""
-        self._legs: deque[Interval] = deque(earlier._legs if earlier else (), maxlen=longest)
-
-    def add(self, leg: Interval) -> None:
-        """The leg that ends now."""
-        self._legs.append(leg)
-
-    def back(self, deputy: Vector, age: float) -> tuple[Vector, Matrix]:
-        """Where the deputy was.
-
-        Args:
-            deputy: inertial state now, (6,).
-            age: how long ago, s.
-
-        Returns:
-            Inertial state then, (6,), and its derivative with respect to that of now, (6, 6). What the
-            process noise did in between is left out.
-        """
-        transition = np.eye(6)
-        for leg in reversed(self._legs):
-            if age <= 0.0:
-                break
-            duration = min(age, leg.duration)
-            thrust = leg.acceleration @ hill_rotation(leg.chief)
-            deputy, flight = advance_with_transition(deputy, thrust, -duration, substeps(duration))
-            transition = flight @ transition
-            age -= duration
-        if age > 0.0:
-            deputy, flight = advance_with_transition(deputy, _AT_REST, -age, substeps(age))
-            transition = flight @ transition
-        return deputy, transition
+_NO_ACCELERATION = np.zeros(3)
 
 
 @dataclass(frozen=True, slots=True)
-class Readings:
-    """Readings that the filter is to take at a tick."""
+class MeasurementModel:
+    """Stacked measurement function of k readings with m values in all."""
 
-    sensor: np.ndarray
-    """(k,) constants of `Sensor`."""
-    value: Vector
-    """(k,) in the unit of the sensor."""
-    age: Vector
+    sensors: tuple[str, ...]
+    """Sensor of each reading."""
+    codes: NDArray[np.int64]
+    """(k,) the same as kernels have it."""
+    rows: tuple[slice, ...]
+    """Places of each reading's values."""
+    angles: NDArray[np.bool_] | None
+    """(m,) whether each value is an angle; none when no value is."""
+    size: int
+    """Number of values, m."""
+
+
+@lru_cache(maxsize=256)
+def measurement_model(names: tuple[str, ...]) -> MeasurementModel:
+    """Model of readings by these sensors, in this order; one or more."""
+    known = [sensors()[name] for name in names]
+    ends = accumulate((sensor.size for sensor in known), initial=0)
+    angles = np.array([place in sensor.angles for sensor in known for place in range(sensor.size)])
+    return MeasurementModel(
+        names,
+        np.array([CODES[name] for name in names], dtype=np.int64),
+        tuple(slice(begin, end) for begin, end in pairwise(ends)),
+        angles if angles.any() else None,
+        len(angles),
+    )
+
+
+@dataclass(slots=True)
+class Readings:
+    """Readings of a tick."""
+
+    model: MeasurementModel
+    values: Vector
+    """(m,) in the unit of each sensor."""
+    ages: Sequence[float]
     """(k,) s."""
     variance: Vector
-    """(k,) of the noise."""
+    """(m,) of the noise."""
     chief: Vector
-    """(6,) the chief's inertial state now."""
-    track: StateHistory
+    """(6,) chief's inertial state now."""
+    history: StateHistory
     late: bool
-    """Whether any of them is older than now."""
+    """Whether any reading is older than now."""
 
     def expected(self, state: Vector) -> tuple[Vector, Matrix]:
-        """(k,) readings without noise at a relative state now (6,), and their Jacobian (k, 6) with respect
-        to it."""
+        """Values without noise, (m,), at a relative state now (6,), and their Jacobian (m, 6) with respect to it."""
+        model = self.model
         if not self.late:
-            now: tuple[Vector, Matrix] = kernels.read_relative(self.sensor, self.chief, state)
+            now: tuple[Vector, Matrix] = measure_relative(model.codes, self.chief, state)
             return now
         deputy = inertial_from_relative(self.chief, state)
         to_inertial = hill_transform_inverse(self.chief)
-        readings, jacobian = np.empty(len(self.sensor)), np.empty((len(self.sensor), 6))
-        for row, age in enumerate(self.age.tolist()):
-            then, transition = self.track.back(deputy, age)
-            chief = kernels.coast(self.chief, _AT_REST, -age, substeps(age)) if age else self.chief
-            reading, derivative = kernels.read(self.sensor[row : row + 1], then, chief)
-            readings[row], jacobian[row] = reading[0], derivative[0] @ transition @ to_inertial
-        return readings, jacobian
+        values, jacobian = np.empty(model.size), np.empty((model.size, 6))
+        for place, (age, rows) in enumerate(zip(self.ages, model.rows, strict=True)):
+            then, transition = self.history.state_before(deputy, age)
+            chief = motion.coast(self.chief, _NO_ACCELERATION, -age, substeps(age)) if age else self.chief
+            values[rows], derivatives = measure(model.codes[place : place + 1], then, chief)
+            jacobian[rows] = [row @ transition @ to_inertial for row in derivatives]
+        return values, jacobian
 
     def innovation(self, expected: Vector) -> Vector:
-        """(..., k) reading minus expectation (..., k), angles the short way round."""
-        difference: Vector = self.value - expected
-        if _RIGHT_ASCENSION in self.sensor.tolist():
-            turning = self.sensor == _RIGHT_ASCENSION
-            difference[..., turning] = (difference[..., turning] + pi) % (2.0 * pi) - pi
+        """Values minus expected ones (..., m), angles within half a turn."""
+        difference: Vector = self.values - expected
+        if self.model.angles is not None:
+            angles = self.model.angles
+            difference[..., angles] = (difference[..., angles] + pi) % (2.0 * pi) - pi
         return difference
 
-    def select(self, chosen: np.ndarray) -> "Readings":
-        """Those for which the mask (k,) holds."""
+    def select(self, chosen: Sequence[bool]) -> "Readings":
+        """Readings for which `chosen` (k,) holds; one or more."""
+        model = self.model
+        pairs = list(zip(model.sensors, model.rows, self.ages, chosen, strict=True))
+        values = np.concatenate([np.arange(rows.start, rows.stop) for _, rows, _, each in pairs if each])
         return Readings(
-            self.sensor[chosen],
-            self.value[chosen],
-            self.age[chosen],
-            self.variance[chosen],
+            measurement_model(tuple(name for name, _, _, each in pairs if each)),
+            self.values[values],
+            [age for _, _, age, each in pairs if each],
+            self.variance[values],
             self.chief,
-            self.track,
+            self.history,
             self.late,
         )
-
-
-def pseudo_measurements(sensor: np.ndarray, reading: Vector, chief_radius: float) -> Vector:
-    """Neokleous' pseudo-measurements (3.13) instead of radius, range rate and latitude.
-
-    y1 = r^2 - r_c^2, y2 = (1/2) d(r^2)/dt = r r', y3 = r sin(latitude). The last is the height above the
-    equator, which is the cross-track position only about an equatorial chief.
-
-    Args:
-        sensor: (k,) constants of `Sensor`; a radius among them.
-        reading: (..., k).
-        chief_radius: m.
-
-    Returns:
-        (..., k): m^2, m^2/s and m in place of the three; other readings as they are.
-    """
-    out = reading.copy()
-    radius = reading[..., sensor == Sensor.RADIUS]
-    squared, rated, raised = (sensor == each for each in (Sensor.RADIUS, Sensor.RANGE_RATE, Sensor.LATITUDE))
-    out[..., squared] = (radius - chief_radius) * (radius + chief_radius)
-    out[..., rated] = radius * reading[..., rated]
-    out[..., raised] = radius * np.sin(reading[..., raised])
-    return out
-
-
-def pseudo_jacobian(sensor: np.ndarray, reading: Vector) -> Matrix:
-    """(k, k) derivative of `pseudo_measurements` with respect to readings (k,)."""
-    out = np.eye(len(sensor))
-    (row,) = np.flatnonzero(sensor == Sensor.RADIUS)
-    radius = reading[row]
-    out[row, row] = 2.0 * radius
-    for index in np.flatnonzero(sensor == Sensor.RANGE_RATE):
-        out[index, index], out[index, row] = radius, reading[index]
-    for index in np.flatnonzero(sensor == Sensor.LATITUDE):
-        out[index, index], out[index, row] = radius * np.cos(reading[index]), np.sin(reading[index])
-    return out

@@ -1,136 +1,151 @@
-"""What comes in is checked here before the filter sees it, and what is rejected is counted by reason."""
+"""Checks of a measurement before the filter uses it; rejections are counted by reason."""
 
-from math import isfinite
+from collections import Counter
+from math import isfinite, sqrt
 
 import numpy as np
 
-from formation_gnc.navigation.measurement import NAMES, Readings, StateHistory
+from formation_gnc.navigation.measurement import Readings, measurement_model
+from formation_gnc.navigation.state_history import StateHistory
 from formation_gnc.orbit.constants import EARTH_RADIUS
-from formation_gnc.records import Measurement, Reading, Rejection, RejectionCount
+from formation_gnc.records import Reading, Rejection, RejectionCount
+from formation_gnc.sensors.registry import sensors
 from formation_gnc.types import NANOSECONDS, Vector
 
-WORDS = {reason: reason.replace("_", " ") for reason in Rejection}
+FORGET_EVERY = 64
+"""Readings of a sensor after which remembered times are dropped that are too old to repeat."""
 
-MEMORY = 20
-"""Times of readings of a sensor above which those are forgotten that are too old to come again."""
+LARGEST_RADIUS, LARGEST_SPEED = 1e9, 1.2e4
+"""Beyond any orbit about the Earth, m and m/s."""
 
-FARTHEST, FASTEST = 1e9, 1.2e4
-"""Beyond what orbits about the Earth reach: distance from its centre, m, and speed, m/s."""
+LARGEST_ACCELERATION = 100.0
+"""Beyond any thruster, m/s^2."""
 
-_SENSORS = {name: int(sensor) for sensor, name in NAMES.items()}
+LEAST_MASS = 1e-6
+"""Below any satellite, kg."""
 
 
 class Rejections:
-    """Counts of what was rejected since the start of the run, and the news of them."""
+    """Counts of rejections since the start of the run, and reports of them for events."""
 
     def __init__(self) -> None:
-        """Nothing yet."""
+        """Without a rejection."""
         self.counts: list[RejectionCount] = []
-        self._seen: dict[tuple[str, Rejection], int] = {}
-        self._news: list[tuple[str, str]] = []
+        """By reason, in the order in which they came up; replaced at every rejection, since estimates hold it."""
+        self._by_reason: Counter[Rejection] = Counter()
+        self._by_subject: Counter[tuple[str, Rejection]] = Counter()
+        self._reports: list[tuple[str, str]] = []
 
-    def add(self, reason: Rejection, what: str, detail: str = "") -> None:
-        """Count a rejection of something, such as a sensor's reading; the 1st, 10th, 100th ... of a kind is
-        news."""
-        counts = {each.reason: each.count for each in self.counts}
-        counts[reason] = counts.get(reason, 0) + 1
-        self.counts = [RejectionCount(*each) for each in counts.items()]  # an estimate holds the old ones
-        self._seen[what, reason] = seen = self._seen.get((what, reason), 0) + 1
-        if str(seen).strip("0") == "1":
-            text = f"{WORDS[reason]}, {detail}" if detail else WORDS[reason]
-            self._news.append((what, text if seen == 1 else f"{text} ({seen} by now)"))
+    def add(self, reason: Rejection, subject: str, detail: str = "") -> None:
+        """Count a rejection of a subject, such as a sensor; the 1st, 10th, 100th, ... of a kind is reported."""
+        self._by_reason[reason] += 1
+        self.counts = [RejectionCount(str(each), count) for each, count in self._by_reason.items()]
+        self._by_subject[subject, reason] += 1
+        count = self._by_subject[subject, reason]
+        if str(count).strip("0") == "1":
+            words = reason.replace("_", " ")
+            text = f"{words}, {detail}" if detail else words
+            self._reports.append((subject, text if count == 1 else f"{text} ({count} by now)"))
 
-    def news(self) -> list[tuple[str, str]]:
-        """Subject and detail of what there is to log since it was last asked for."""
-        news, self._news = self._news, []
-        return news
+    def take_reports(self) -> list[tuple[str, str]]:
+        """Subject and detail of each report since they were last taken."""
+        reports, self._reports = self._reports, []
+        return reports
 
 
-class Screen:
-    """Checks readings, each for itself, before any of them is compared with the state."""
+class ReadingChecks:
+    """Checks each reading by itself, before it is compared with the state."""
 
     def __init__(self, rejections: Rejections) -> None:
-        """Remember no reading yet."""
+        """Without a memory of readings."""
         self._rejections = rejections
-        self._taken: dict[str, list[int]] = {}
+        self._times: dict[str, set[int]] = {}
 
-    def admit(
+    def accept(
         self,
-        measurement: Measurement,
-        variance: dict[int, float],
+        readings: list[Reading],
+        time: int,
+        variance: dict[str, tuple[float, ...]],
         latest: float,
         chief: Vector,
-        track: StateHistory,
+        history: StateHistory,
     ) -> Readings | None:
-        """The readings that are what they should be; none when there are none.
+        """Valid readings; none when there are none.
 
         Args:
-            measurement: with readings.
-            variance: by sensor in use; readings of others are left out.
+            readings: of a measurement.
+            time: its stamp, ns.
+            variance: of the noise of each value, by sensor in use; other sensors' readings are ignored.
             latest: age (s) above which a reading is rejected.
             chief: inertial state now, (6,).
-            track: the legs that led here.
+            history: past intervals.
         """
-        sensors: list[int] = []
+        names: list[str] = []
         values: list[float] = []
         ages: list[float] = []
-        for reading in measurement.readings:
-            sensor = _SENSORS.get(reading.sensor)
-            if sensor is None:
-                self._rejections.add(Rejection.UNKNOWN_SENSOR, reading.sensor)
-            elif sensor in variance:
-                reason = self._fault(measurement.time, reading, latest)
-                if reason is None:
-                    sensors.append(sensor)
-                    values.append(reading.values[0])
-                    ages.append(reading.age / NANOSECONDS)
-                else:
-                    self._rejections.add(reason, reading.sensor)
-        if not sensors:
+        variances: list[float] = []
+        for reading in readings:
+            noise = variance.get(reading.sensor)
+            if noise is None:
+                if reading.sensor not in sensors():
+                    self._rejections.add(Rejection.UNKNOWN_SENSOR, reading.sensor)
+                continue
+            reason = self._fault(reading, len(noise), time, latest)
+            if reason is not None:
+                self._rejections.add(reason, reading.sensor)
+                continue
+            names.append(reading.sensor)
+            values += reading.values
+            ages.append(reading.age / NANOSECONDS)
+            variances += noise
+        if not names:
             return None
-        return Readings(
-            np.array(sensors, dtype=np.int64),
-            np.array(values),
-            np.array(ages),
-            np.array([variance[sensor] for sensor in sensors]),
-            chief,
-            track,
-            any(ages),
-        )
+        model = measurement_model(tuple(names))
+        return Readings(model, np.array(values), ages, np.array(variances), chief, history, any(ages))
 
-    def _fault(self, time: int, reading: Reading, latest: float) -> Rejection | None:
-        if len(reading.values) != 1 or not isfinite(reading.values[0]):
+    def _fault(self, reading: Reading, size: int, time: int, latest: float) -> Rejection | None:
+        if len(reading.values) != size or not all(map(isfinite, reading.values)):
             return Rejection.NOT_FINITE
         if reading.age < 0:
             return Rejection.FUTURE
         if reading.age / NANOSECONDS > latest:
             return Rejection.LATE
         taken = time - reading.age
-        known = self._taken.setdefault(reading.sensor, [])
+        known = self._times.setdefault(reading.sensor, set())
         if taken in known:
             return Rejection.DUPLICATE
-        if len(known) > MEMORY:
+        if len(known) % FORGET_EVERY == 0:
             oldest = time - round(latest * NANOSECONDS)
-            known[:] = [each for each in known if each >= oldest]
-        known.append(taken)
+            known.difference_update([each for each in known if each < oldest])
+        known.add(taken)
         return None
 
 
-def credible_fix(fix: Vector, chief: Vector) -> bool:
-    """Whether an acquisition fix (6,) can be one: in an orbit, not inside the Earth."""
+def is_plausible_fix(fix: Vector, chief: Vector) -> bool:
+    """Whether an acquisition fix (6,) about a chief (6,) can be in an orbit, outside the Earth."""
     x, y, z, vx, vy, vz = fix.tolist()
-    height = x + float(np.sqrt(chief[:3] @ chief[:3]))
-    above = EARTH_RADIUS**2 < height * height + y * y + z * z < FARTHEST**2
-    return bool(above and vx * vx + vy * vy + vz * vz < FASTEST**2)
+    radial = x + sqrt(chief[:3] @ chief[:3])
+    above = EARTH_RADIUS**2 < radial * radial + y * y + z * z < LARGEST_RADIUS**2
+    return bool(above and vx * vx + vy * vy + vz * vz < LARGEST_SPEED**2)
 
 
-def credible_chief(chief: Vector) -> bool:
-    """Whether an inertial state (6,) can be an orbit: finite, above the ground, moving across the radius,
-    and bound."""
+def is_plausible_chief(chief: Vector) -> bool:
+    """Whether an inertial state (6,) can be an orbit: finite, above the ground, not rectilinear, bound."""
     x, y, z, vx, vy, vz = map(float, chief)
     if not all(map(isfinite, (x, y, z, vx, vy, vz))):
         return False
     square, speed = x * x + y * y + z * z, vx * vx + vy * vy + vz * vz
     radial = x * vx + y * vy + z * vz
     across = square * speed - radial * radial
-    return EARTH_RADIUS**2 < square < FARTHEST**2 and across > 1.0 and speed < FASTEST**2
+    return EARTH_RADIUS**2 < square < LARGEST_RADIUS**2 and across > 1.0 and speed < LARGEST_SPEED**2
+
+
+def is_plausible_mass(mass: float) -> bool:
+    """Whether a mass (kg) can be a satellite's."""
+    return isfinite(mass) and mass > LEAST_MASS
+
+
+def is_plausible_acceleration(acceleration: Vector) -> bool:
+    """Whether an acceleration (3,), m/s^2, can be a thruster's."""
+    x, y, z = acceleration.tolist()
+    return bool(x * x + y * y + z * z <= LARGEST_ACCELERATION**2)  # false for NaN

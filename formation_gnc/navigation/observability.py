@@ -1,84 +1,83 @@
-"""Which direction of the relative state the sensors cannot see.
+"""Unobservable directions of the relative state.
 
-A direction is a relative state with its rates divided by the mean motion, so that all six are in metres, of
-unit length.
+A direction is a relative state of unit length, its rates divided by the mean motion, so that all six components
+are in metres.
 """
 
 from math import tau
 
 import numpy as np
 
-from formation_gnc.navigation import kernels
+from formation_gnc.navigation.kernels import linear_algebra, motion
+from formation_gnc.navigation.kernels.measurement import measure_relative
+from formation_gnc.navigation.measurement import measurement_model
 from formation_gnc.navigation.process import Interval, NonlinearProcess, substeps
 from formation_gnc.orbit.frames import hill_transform
 from formation_gnc.types import Matrix, Vector
 
 UNOBSERVABLE = 1e-9
-"""A direction about which the sensors tell less than this, relative to the best-seen one, is unobservable: both in
-information, the square of an inverse length. Rounding and an imperfect linearisation leave 1e-13 of a
-direction that has none."""
+"""Largest information on an unobservable direction, as a share of that on the best observed one. Rounding and
+linearisation leave about 1e-13 where there is none."""
 
 STEPS_PER_ORBIT = 120
 
 AXES = ("radial", "along-track", "cross-track", "radial rate", "along-track rate", "cross-track rate")
 
-NOTHING = np.zeros(6)
+NO_DIRECTION = np.zeros(6)
 
-_AT_REST = np.zeros(3)
-_ON_THE_CHIEF = np.zeros(6)
+_NO_ACCELERATION = np.zeros(3)
+_AT_CHIEF = np.zeros(6)
 _NO_NOISE = np.zeros((6, 6))
 
 
-def gramian(chief: Vector, variance: dict[int, float], window: float, state: Vector = _ON_THE_CHIEF) -> Matrix:
-    """Observability Gramian of a deputy over a time to come: sum of (H Phi)' R^-1 (H Phi).
+def gramian(chief: Vector, variance: dict[str, tuple[float, ...]], window: float, state: Vector = _AT_CHIEF) -> Matrix:
+    """Observability Gramian of a deputy over a time ahead: sum of (H Phi)' R^-1 (H Phi).
 
     Args:
         chief: inertial state at the start, (6,), m and m/s.
-        variance: of the noise by sensor; each reads `STEPS_PER_ORBIT` times an orbit.
+        variance: of the noise of each value, by sensor; each reads `STEPS_PER_ORBIT` times an orbit.
         window: s.
         state: relative state at the start, (6,).
 
     Returns:
         (6, 6) information on the relative state at the start, in m^-2, s m^-2, s^2 m^-2.
     """
-    sensors = np.array(list(variance), dtype=np.int64)
-    weight = 1.0 / np.array(list(variance.values()))
+    codes = measurement_model(tuple(variance)).codes
+    weight = 1.0 / np.array([each for values in variance.values() for each in values])
     step = orbit_period(chief) / STEPS_PER_ORBIT
     total, since = np.zeros((6, 6)), np.eye(6)
     for _ in range(max(1, round(window / step))):
-        _, jacobian = kernels.read_relative(sensors, chief, state)
-        seen = np.isfinite(jacobian).all(axis=1)
-        total += information(jacobian[seen] @ since, weight[seen])
-        later = kernels.coast(chief, _AT_REST, step, substeps(step))
-        leg = Interval(chief, later, _AT_REST, step, substeps(step))
-        state, _, transition = NonlinearProcess().predict(leg, state, _NO_NOISE, _NO_NOISE)
+        _, jacobian = measure_relative(codes, chief, state)
+        defined = np.isfinite(jacobian).all(axis=1)
+        total += information(jacobian[defined] @ since, weight[defined])
+        later = motion.coast(chief, _NO_ACCELERATION, step, substeps(step))
+        interval = Interval(chief, later, _NO_ACCELERATION, step, substeps(step))
+        state, _, transition = NonlinearProcess().predict(interval, state, _NO_NOISE, _NO_NOISE)
         chief, since = later, transition @ since
     return total
 
 
 def information(jacobian: Matrix, weight: Vector) -> Matrix:
-    """H' R^-1 H of readings with Jacobian (k, 6) and inverse variances (k,)."""
-    told: Matrix = (jacobian * weight[:, None]).T @ jacobian
-    return told
+    """H' R^-1 H of readings with Jacobian (m, 6) and inverse variances (m,)."""
+    product: Matrix = (jacobian * weight[:, None]).T @ jacobian
+    return product
 
 
 def unobservable_directions(gramian: Matrix, mean_motion: float) -> Matrix:
-    """The directions, (b, 6), about which a Gramian has no information, the blindest first."""
+    """Directions (b, 6) on which a Gramian has no information, the least observable first."""
     scale = np.repeat([1.0, mean_motion], 3)
     information, directions = np.linalg.eigh(gramian * np.outer(scale, scale))
     unobservable = directions.T[information <= UNOBSERVABLE * information[-1]]
-    # An eigenvector is one up to its sign: let its largest component be positive.
+    # The sign of an eigenvector is arbitrary: the largest component is positive.
     return np.array([each * np.sign(each[np.argmax(np.abs(each))]) for each in unobservable]).reshape(-1, 6)
 
 
 def predicted_unobservable_direction(chief: Vector) -> Vector:
-    """The direction (6,) that radius, range rate and latitude cannot see: a turn of the orbit about the
-    Earth's axis.
+    """Direction (6,) that radius, range rate and latitude do not observe: a turn of the orbit about the Earth's axis.
 
     In the Hill frame of a circular chief at argument of latitude u it is
-    [0, 0, cos i, 0, -sin i cos u, n sin i sin u] with position along-track cos i and cross-track -sin i cos
-    u; here it is exact for any chief: a turn changes position by k x r and velocity by k x v, with k the
-    Earth's axis.
+    [0, 0, cos i, 0, -sin i cos u, n sin i sin u] with position along-track cos i and cross-track -sin i cos u; here
+    it is exact for any chief: a turn changes position by k x r and velocity by k x v, with k the Earth's axis.
     """
     rate = tau / orbit_period(chief)
     turned = np.array([-chief[1], chief[0], 0.0, -chief[4], chief[3], 0.0])
@@ -87,60 +86,64 @@ def predicted_unobservable_direction(chief: Vector) -> Vector:
 
 
 def orbit_period(chief: Vector) -> float:
-    """Period (s) of the circular orbit on which the chief would have its present angular rate."""
+    """Period (s) of the circular orbit at the chief's present angular rate."""
     momentum = np.cross(chief[:3], chief[3:])
     return float(tau * (chief[:3] @ chief[:3]) / np.sqrt(momentum @ momentum))
 
 
 def in_words(directions: Matrix) -> str:
-    """The unobservable directions (b, 6) by their largest components; empty when there are none."""
+    """Directions (b, 6) by their largest components; empty when there are none."""
     return ", ".join(AXES[int(np.argmax(np.abs(each)))] for each in directions)
 
 
 class Observability:
-    """The Gramian of what the filter really took, over one window after the other, and the unobservable direction
-    it shows.
+    """Observability Gramian of the readings used, window after window, and the unobservable direction it shows.
 
-    At the start of a window the state is x_0; a reading taken later says H Phi(t, t_0) x_0. A tick costs
-    one product of matrices. Until the first window is full, the direction is that of the readings to be
-    expected; a direction moves with the transition matrix from tick to tick.
+    Until the first window ends, the direction is that of the readings expected. Each tick multiplies the direction
+    and the transition since the window's start by the transition matrix.
     """
 
     def __init__(
-        self, chief: Vector, state: Vector, variance: dict[int, float], window: float, mean_motion: float
+        self,
+        chief: Vector,
+        state: Vector,
+        variance: dict[str, tuple[float, ...]],
+        window: float,
+        mean_motion: float,
     ) -> None:
-        """Foresee what sensors with these variances will tell; see `gramian`."""
+        """Start with the Gramian of a window ahead; arguments as `gramian`, mean motion in rad/s."""
         self._mean_motion, self._window = mean_motion, window
         self._set(unobservable_directions(gramian(chief, variance, window, state), mean_motion))
-        self._restart()
+        self._begin_window()
 
-    def _restart(self) -> None:
-        self._elapsed, self._since, self._told = 0.0, np.eye(6), np.zeros((6, 6))
+    def _begin_window(self) -> None:
+        self._elapsed, self._transition, self._gramian = 0.0, np.eye(6), np.zeros((6, 6))
 
     def _set(self, directions: Matrix) -> None:
         self.words = in_words(directions)
-        self.direction = directions[0] if len(directions) else NOTHING
-        """(6,) the blindest direction now; zero when everything is seen."""
+        self.direction = directions[0] if len(directions) else NO_DIRECTION
+        """(6,) least observable direction; zero when the state is observable."""
 
-    def fly(self, transition: Matrix, duration: float) -> bool:
-        """Move along; returns whether a window has ended, and with it what is said of the unobservable direction."""
-        self.direction = self._moved(self.direction, transition)
-        kernels.compose(self._since, transition)
+    def propagate(self, transition: Matrix, duration: float) -> bool:
+        """Propagate by a transition matrix (6, 6) over a duration, s; returns whether a window has ended."""
+        self.direction = self._propagated(self.direction, transition)
+        linear_algebra.accumulate_transition(self._transition, transition)
         self._elapsed += duration
         if self._elapsed < self._window:
             return False
-        if self._told.any():
-            unobservable = unobservable_directions(self._told, self._mean_motion)
-            self._set(np.array([self._moved(each, self._since) for each in unobservable]).reshape(-1, 6))
-        self._restart()
+        if self._gramian.any():
+            unobservable = unobservable_directions(self._gramian, self._mean_motion)
+            moved = [self._propagated(each, self._transition) for each in unobservable]
+            self._set(np.array(moved).reshape(-1, 6))
+        self._begin_window()
         return True
 
-    def _moved(self, direction: Vector, transition: Matrix) -> Vector:
-        """A copy, since an estimate holds the old one."""
+    def _propagated(self, direction: Vector, transition: Matrix) -> Vector:
+        """A copy: estimates hold the old one."""
         direction = direction.copy()
-        kernels.carry(direction, transition, self._mean_motion)
+        motion.propagate_direction(direction, transition, self._mean_motion)
         return direction
 
-    def take(self, jacobian: Matrix, variance: Vector) -> None:
-        """Count readings with Jacobian (k, 6) with respect to the present state."""
-        kernels.inform(self._told, jacobian, self._since, variance)
+    def add(self, jacobian: Matrix, variance: Vector) -> None:
+        """Add readings with Jacobian (m, 6) with respect to the present state, and variances (m,)."""
+        linear_algebra.accumulate_information(self._gramian, jacobian, self._transition, variance)

@@ -1,7 +1,7 @@
 """Compilation of the hot loops, cached on disk so that a process starts fast.
 
-Numba checks a cached function against its own source file only, and would go on using a kernel whose callees
-in another file have changed. So the cache of this package is keyed by the content of all its sources.
+Numba validates a cached kernel against its own source file only, not against callees and constants of other
+files. The cache directory is therefore keyed by the content of every folder that its kernels are built from.
 Concurrent processes are safe: numba replaces files atomically, and an explicit signature leaves one entry per
 function.
 """
@@ -22,16 +22,24 @@ ANY_VECTOR = numba.types.Array(numba.float64, 1, "A", readonly=True)
 ANY_MATRIX = numba.types.Array(numba.float64, 2, "A", readonly=True)
 """The same of a matrix."""
 
-_HERE = Path(__file__).resolve().parent
+SOURCES = {
+    "orbit": ("orbit",),
+    "relative": ("orbit", "relative"),
+    "sensors": ("orbit", "sensors"),
+    "navigation/kernels": ("orbit", "sensors", "navigation/kernels"),
+}
+"""Folders of the package with kernels, and those that kernels in them are built from."""
+
+_PACKAGE = Path(__file__).resolve().parents[1]
 
 
-def _cache_directory(key: str = "") -> str:
-    """First writable place for compiled code, or an empty string when there is none."""
+def _cache_directory(folder: str, key: str = "") -> str:
+    """First writable place for the compiled kernels of a folder, or an empty string when there is none."""
     digest = sha256(key.encode())
-    for source in sorted(_HERE.rglob("*.py")):
+    for source in (source for each in SOURCES[folder] for source in sorted((_PACKAGE / each).rglob("*.py"))):
         digest.update(source.read_bytes())
     user_cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    for root in (numba.config.CACHE_DIR, _HERE / "__pycache__", user_cache / "formation_gnc"):
+    for root in (numba.config.CACHE_DIR, _PACKAGE / "orbit" / "__pycache__", user_cache / "formation_gnc"):
         if not root:
             continue
         directory = Path(root) / f"kernels-{digest.hexdigest()[:16]}"
@@ -47,6 +55,11 @@ def _cache_directory(key: str = "") -> str:
 _directory_for = cache(_cache_directory)
 
 
+def _folder(function: Callable[..., Any]) -> str:
+    source = Path(function.__code__.co_filename)
+    return next((each for each in SOURCES if source.is_relative_to(_PACKAGE / each)), "orbit")
+
+
 def kernel[F: Callable[..., Any]](signature: Any, key: str = "") -> Callable[[F], F]:
     """Compile a function, when its module is imported, for exactly this signature.
 
@@ -54,11 +67,11 @@ def kernel[F: Callable[..., Any]](signature: Any, key: str = "") -> Callable[[F]
 
     Args:
         signature: numba signature; arguments of other types are rejected, layouts are as declared.
-        key: digest of what the function calls outside this package and its own file.
+        key: digest of what the function calls outside the folders of `SOURCES`.
     """
-    directory = _directory_for(key)
 
     def compile_function(function: F) -> F:
+        directory = _directory_for(_folder(function), key)
         previous, numba.config.CACHE_DIR = numba.config.CACHE_DIR, directory
         try:
             compiled: F = numba.njit(signature, cache=bool(directory), error_model="numpy")(function)

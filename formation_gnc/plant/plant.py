@@ -22,7 +22,7 @@ from formation_gnc.parameters import parameter, per_name
 from formation_gnc.plant.sensors import Sensors, SensorSuite
 from formation_gnc.plant.thrusters import NO_FORCE, Denial, Thruster, ThrusterParameters, ThrusterState
 from formation_gnc.randomness import generator
-from formation_gnc.records import Event, EventKind, Measurement, Reading, SatelliteTruth, Sensor, Truth
+from formation_gnc.records import Event, EventKind, Measurement, SatelliteTruth, Truth
 from formation_gnc.types import NANOSECONDS, Vector
 
 
@@ -152,14 +152,13 @@ class Plant:
         for place, satellite in enumerate(self._satellites, 1):  # an array ends its iteration with an error
             state = self._states[place]
             satellite.eclipse = self._propagator.illumination(seconds, state) < 1.0
-            read = zip(*satellite.sensors.readings(self.tick, state, chief), strict=True)
             missed = satellite.missed
             # In the order of its fields: by their names it would take twice as long.
             measurements[satellite.name] = Measurement(
                 self.time,
                 satellite.name,
                 chief,
-                [Reading(Sensor(k).name.lower(), [y], round(age * NANOSECONDS)) for k, y, age in read],
+                satellite.sensors.readings(self.tick, state, chief),
                 self._forces[place],
                 satellite.state.mass,
                 satellite.eclipse,

@@ -1,6 +1,7 @@
 """The cache of compiled code: keyed by content, shared by processes, done without if nothing is writable."""
 
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -8,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+import formation_gnc
 from formation_gnc.orbit import jit
 
 KERNEL = """
@@ -22,6 +24,9 @@ print(twice(21.0), len(twice.stats.cache_hits))
 """
 
 
+directory = jit._cache_directory
+
+
 @pytest.fixture
 def roots(tmp_path, monkeypatch):
     """Two places for the cache: that of numba's configuration, and the user's."""
@@ -31,7 +36,7 @@ def roots(tmp_path, monkeypatch):
 
 
 def test_cache_lies_where_numba_is_told(roots):
-    assert Path(jit._cache_directory()).parent == roots / "configured"
+    assert Path(directory("orbit")).parent == roots / "configured"
 
 
 def test_cache_goes_to_the_user_when_the_package_is_read_only(roots, monkeypatch):
@@ -44,7 +49,7 @@ def test_cache_goes_to_the_user_when_the_package_is_read_only(roots, monkeypatch
         raise PermissionError(dir)
 
     monkeypatch.setattr(jit.tempfile, "TemporaryFile", reject)
-    assert Path(jit._cache_directory()).parent == roots / "user" / "formation_gnc"
+    assert Path(directory("orbit")).parent == roots / "user" / "formation_gnc"
 
 
 def test_nothing_writable_means_no_cache(roots, monkeypatch):
@@ -52,19 +57,39 @@ def test_nothing_writable_means_no_cache(roots, monkeypatch):
         raise PermissionError(dir)
 
     monkeypatch.setattr(jit.tempfile, "TemporaryFile", reject)
-    assert jit._cache_directory() == ""
+    assert directory("orbit") == ""
 
 
-def test_cache_changes_with_any_source(roots, monkeypatch, tmp_path):
+@pytest.mark.parametrize(
+    ("folder", "source"), [(folder, each) for folder in jit.SOURCES for each in jit.SOURCES[folder]]
+)
+def test_cache_changes_with_any_source(roots, monkeypatch, tmp_path, folder, source):
     """A constant in one file is compiled into kernels of another: neither may outlive the other."""
-    package = tmp_path / "package"
-    package.mkdir()
-    (package / "constants.py").write_text("MU = 1.0\n")
-    monkeypatch.setattr(jit, "_HERE", package)
-    before = jit._cache_directory()
-    assert jit._cache_directory() == before
-    (package / "constants.py").write_text("MU = 2.0\n")
-    assert jit._cache_directory() != before
+    file = tmp_path / "package" / source / "constants.py"
+    file.parent.mkdir(parents=True)
+    file.write_text("MU = 1.0\n")
+    monkeypatch.setattr(jit, "_PACKAGE", tmp_path / "package")
+    before = directory(folder)
+    assert directory(folder) == before
+    file.write_text("MU = 2.0\n")
+    assert directory(folder) != before
+
+
+def test_cache_changes_with_the_key_of_what_comes_from_outside(roots):
+    assert len({directory("sensors"), directory("sensors", "a star tracker"), directory("sensors", "another")}) == 3
+
+
+def test_kernels_are_built_from_the_folders_of_their_cache_key():
+    package = Path(formation_gnc.__file__).parent
+    free_of_kernels = {"formation_gnc.errors", "formation_gnc.parameters", "formation_gnc.types"}
+    for file in package.rglob("*.py"):
+        imported = set(re.findall(r"^from (formation_gnc\S*) import", file.read_text(), re.MULTILINE))
+        if "formation_gnc.orbit.jit" not in imported:
+            continue
+        folders = [folder for folder in jit.SOURCES if file.is_relative_to(package / folder)]
+        assert folders, f"{file} has kernels: add its folder to SOURCES"
+        keyed = tuple(f"formation_gnc.{source.replace('/', '.')}" for source in jit.SOURCES[folders[0]])
+        assert all(each.startswith(keyed) for each in imported - free_of_kernels), file
 
 
 def test_processes_that_compile_at_once_do_not_disturb_one_another(tmp_path):

@@ -2,7 +2,7 @@
 
 from formation_gnc.analysis.deputy_history import DeputyHistory
 from formation_gnc.analysis.panels.panel import MEASUREMENTS, DeputyPanel
-from formation_gnc.analysis.panels.sensors import components, sensor_colours, sensor_words
+from formation_gnc.analysis.panels.sensors import components, reading_unit, sensor_colours, title
 from formation_gnc.analysis.plot import TIME, Axis, Curve, Plot, Style
 
 
@@ -10,12 +10,12 @@ def plots(deputy: DeputyHistory) -> list[Plot]:
     """A plot for each sensor that has readings or innovations."""
     result = []
     for sensor, colour in sensor_colours(deputy).items():
-        words, name = sensor_words(sensor), sensor.replace("_", " ")
+        unit = reading_unit(sensor)
         curves = [
-            Curve(label, rows[:, 0], words.scale * rows[:, 1], Style(colour, "none", marker="dot"))
+            Curve(label, rows[:, 0], unit.factor * rows[:, 1], Style(colour, "none", marker="dot"))
             for label, rows in components(deputy.readings, sensor).items()
         ]
-        result.append(Plot(name, TIME, Axis(name, words.unit), curves))
+        result.append(Plot(title(sensor), TIME, Axis(title(sensor), unit.name), curves))
     return result
 
 

@@ -1,38 +1,31 @@
 """Sensors of a history: order, colours, units and words."""
 
-from dataclasses import dataclass
-
-import numpy as np
-
 from formation_gnc.analysis.deputy_history import DeputyHistory
 from formation_gnc.analysis.plot import COLOURS
 from formation_gnc.analysis.sensor_series import Channel
+from formation_gnc.sensors.registry import sensors
+from formation_gnc.sensors.sensor import DisplayUnit
 from formation_gnc.types import Matrix
 
-
-@dataclass(frozen=True)
-class SensorWords:
-    """Unit and scale in which readings and innovations of a sensor are shown."""
-
-    unit: str
-    scale: float
-    innovation_unit: str
-    innovation_scale: float
+_NO_UNIT = DisplayUnit("")
 
 
-_DEGREES = SensorWords("deg", 180.0 / np.pi, "µrad", 1e6)
-_WORDS = {
-    "radius": SensorWords("km", 1e-3, "m", 1.0),
-    "range_rate": SensorWords("m/s", 1.0, "m/s", 1.0),
-    "latitude": _DEGREES,
-    "right_ascension": _DEGREES,
-    "chief_range": SensorWords("m", 1.0, "m", 1.0),
-}
+def title(name: str) -> str:
+    """Title of a sensor; its name for one that is not registered."""
+    sensor = sensors().get(name)
+    return sensor.title if sensor else name.replace("_", " ")
 
 
-def sensor_words(sensor: str) -> SensorWords:
-    """Words for a sensor; without unit for one that is not known."""
-    return _WORDS.get(sensor, SensorWords("", 1.0, "", 1.0))
+def reading_unit(name: str) -> DisplayUnit:
+    """Unit of a sensor's readings in plots; none for one that is not registered."""
+    sensor = sensors().get(name)
+    return sensor.reading_unit if sensor else _NO_UNIT
+
+
+def innovation_unit(name: str) -> DisplayUnit:
+    """Unit of a sensor's innovations in plots; none for one that is not registered."""
+    sensor = sensors().get(name)
+    return sensor.innovation_unit if sensor else _NO_UNIT
 
 
 def sensor_colours(deputy: DeputyHistory) -> dict[str, str]:
@@ -41,8 +34,10 @@ def sensor_colours(deputy: DeputyHistory) -> dict[str, str]:
     return {sensor: COLOURS[number % len(COLOURS)] for number, sensor in enumerate(sensors)}
 
 
-def components(series: dict[Channel, Matrix], sensor: str) -> dict[str, Matrix]:
-    """Rows of a sensor by label: its name, numbered where a reading has several components."""
-    own = {component: rows for (name, component), rows in series.items() if name == sensor}
-    name = sensor.replace("_", " ")
-    return {name if len(own) == 1 else f"{name} {component + 1}": rows for component, rows in own.items()}
+def components(series: dict[Channel, Matrix], name: str) -> dict[str, Matrix]:
+    """Rows of a sensor by label: its title, with the label or number of each value of its readings."""
+    sensor = sensors().get(name)
+    own = {component: rows for (each, component), rows in series.items() if each == name}
+    labels = sensor.labels if sensor else ("",) if len(own) == 1 else ()
+    words = {component: labels[component] if component < len(labels) else str(component + 1) for component in own}
+    return {f"{title(name)} {words[component]}".rstrip(): rows for component, rows in own.items()}

@@ -1,0 +1,73 @@
+"""What the navigation filter carries from tick to tick, and its start from an acquisition fix."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from formation_gnc.navigation.chief_tracker import ChiefTracker
+from formation_gnc.navigation.consistency import Consistency
+from formation_gnc.navigation.filters import FILTERS, RelativeFilter
+from formation_gnc.navigation.measurement_checks import ReadingChecks, Rejections, is_plausible_mass
+from formation_gnc.navigation.observability import Observability, orbit_period
+from formation_gnc.navigation.parameters import NavigationParameters
+from formation_gnc.navigation.process import ProcessModel
+from formation_gnc.navigation.state_history import StateHistory
+from formation_gnc.navigation.step import StepConstants
+from formation_gnc.records import Measurement
+from formation_gnc.types import Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Design:
+    """What follows from the parameters."""
+
+    process: ProcessModel
+    step: StepConstants
+    """Of a tick."""
+    variance: dict[str, tuple[float, ...]]
+    """Of the noise of each value of a reading, by sensor in use."""
+    gate: float
+    """Largest accepted innovation squared over its variance."""
+
+
+@dataclass
+class FilterState:
+    """State of the filter, from an acquisition fix on."""
+
+    filter: RelativeFilter
+    time: int
+    """Stamp of the state, ns."""
+    chief: ChiefTracker
+    mass: float
+    """Last plausible mass, kg."""
+    history: StateHistory
+    checks: ReadingChecks
+    observability: Observability
+    last_reading: int
+    """Stamp at which a reading was last used, ns."""
+    consistency: Consistency = field(default_factory=Consistency)
+
+
+def acquire(
+    measurement: Measurement, parameters: NavigationParameters, design: Design, rejections: Rejections
+) -> FilterState:
+    """State of the filter from a measurement with a plausible acquisition fix."""
+    variance = [parameters.fix_position_sigma**2, parameters.fix_velocity_sigma**2]
+    return FilterState(
+        filter=FILTERS[parameters.filter](np.array(measurement.fix), np.diag(np.repeat(variance, 3))),
+        time=measurement.time,
+        chief=ChiefTracker(measurement.chief_state),
+        mass=measurement.mass if is_plausible_mass(measurement.mass) else 1.0,
+        history=StateHistory(parameters.latest_ticks),
+        checks=ReadingChecks(rejections),
+        observability=expected_observability(measurement.chief_state, measurement.fix, parameters, design),
+        last_reading=measurement.time,
+    )
+
+
+def expected_observability(
+    chief: Vector, state: Vector, parameters: NavigationParameters, design: Design
+) -> Observability:
+    """Observability with the sensors in use, from chief and relative state (6,) on."""
+    window = parameters.observability_window or orbit_period(chief)
+    return Observability(chief, state, design.variance, window, parameters.mean_motion)

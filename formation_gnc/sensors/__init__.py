@@ -1,0 +1,1 @@
+"""Sensors: measurement functions with their noise, used by plant, filter and plots."""
