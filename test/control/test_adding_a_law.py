@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from formation_gnc import reference
 from formation_gnc.analysis.design_report import design
 from formation_gnc.common import CommonParameters
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
@@ -18,6 +17,7 @@ from formation_gnc.parameters import dump, load, parameter
 from formation_gnc.records import NavigationState, Target
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
+from tools import write_reference
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def test_its_parameters_join_the_schema_of_the_controller():
 
 
 def test_the_reference_page_lists_its_parameters():
-    page = reference.page()
+    page = write_reference.parameters_page()
     assert "| `pd.natural_frequency` | double | rad/s | `0.01` | above 0 | natural frequency | yes |" in page
     assert "adaptive_lqr, pd | active control law |" in page
 
