@@ -19,7 +19,9 @@ import pytest
 import yaml
 
 import formation_gnc
+from formation_gnc import records
 from formation_gnc.sil.scenario import load_scenario
+from formation_gnc.transport.conversion import type_name
 
 ROOT = Path(__file__).resolve().parents[1]
 NODES = {"plant", "navigation", "guidance", "controller", "recorder"}
@@ -93,9 +95,11 @@ def test_versions_agree():
 
 
 @needs_set_up
-def test_package_xml_declares_the_ros_packages_that_are_imported():
+def test_package_xml_declares_the_ros_packages_in_use():
     files = [*ROOT.glob("formation_gnc/**/*.py"), *ROOT.glob("launch/*.py")]
     imported = {name.split(".")[0] for file in files for name in imports(file)}
+    mirrored = [each for each in vars(records).values() if isinstance(each, type) and hasattr(each, "message")]
+    imported |= {type_name(record).partition("/")[0] for record in mirrored}  # loaded by name
     declared = {element.text for element in ElementTree.parse(ROOT / "package.xml").iter("exec_depend")}
     query = "import ament_index_python as index; print(*index.get_packages_with_prefixes())"
     listing = run("bash", "-c", f"source {ROOT}/env.sh && python -c '{query}'")
