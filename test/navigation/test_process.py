@@ -31,4 +31,4 @@ def test_every_process_model_predicts_a_near_circular_orbit(name: str):
     assert state[:3] == pytest.approx(truth[:3], abs=2e-3)
     assert state[3:] == pytest.approx(truth[3:], abs=2e-5)
     assert covariance == pytest.approx(transition @ transition.T, rel=1e-9, abs=1e-12)
-    assert process.move(interval, STATE[None])[0] == pytest.approx(state, abs=1e-9)
+    assert process.propagate(interval, STATE[None])[0] == pytest.approx(state, abs=1e-9)
