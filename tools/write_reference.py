@@ -15,7 +15,7 @@ from formation_gnc.flight.topics import Topic
 from formation_gnc.guidance.parameters import GuidanceParameters
 from formation_gnc.navigation.parameters import NavigationParameters
 from formation_gnc.parameters import Leaf, leaves
-from formation_gnc.plant.plant import PlantParameters
+from formation_gnc.plant.parameters import PlantParameters
 from formation_gnc.recording.layout import LAYOUT, foxglove_layout
 from formation_gnc.recording.parameters import RecorderParameters
 from formation_gnc.recording.player import ReplayParameters

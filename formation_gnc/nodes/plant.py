@@ -8,7 +8,7 @@ from rclpy._rclpy_pybind11 import NodeNameNonExistentError
 
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import COMMAND, every_tick
-from formation_gnc.plant.plant import PlantParameters
+from formation_gnc.plant.parameters import PlantParameters
 from formation_gnc.records import Clock, Event, Measurement, Thrust, Truth
 from formation_gnc.sil.plant_executive import RECORDER, PlantExecutive, Report
 from formation_gnc.transport.diagnostics import ReportPublisher

@@ -1,7 +1,7 @@
 """Earth's gravity and figure, from one published model: EGM2008 (Pavlis et al. 2012), tide-free.
 
-The zonal coefficients are un-normalised, ``J_n = -sqrt(2 n + 1) C_n0``, and belong to exactly this ``MU`` and
-``EARTH_RADIUS``: a coefficient of another model is no drop-in replacement.
+The zonal coefficients are un-normalised, ``J_n = -sqrt(2 n + 1) C_n0``, and valid with this ``MU`` and
+``EARTH_RADIUS`` only: coefficients of another model are no drop-in replacement.
 """
 
 from math import sqrt

@@ -1,4 +1,4 @@
-"""When a satellite is in the Earth's shadow."""
+"""Eclipse forecast: passages of a satellite through the Earth's shadow."""
 
 import math
 
@@ -7,23 +7,24 @@ import numpy as np
 from formation_gnc.orbit.propagation import Array, Propagator
 
 PRECISION = 1e-3
-"""Time (s) to which begin and end are found."""
+"""Precision of begin and end, s."""
 
 
 def eclipses(state: Array, duration: float, step: float, epoch: float = 0.0) -> Array:
-    """Begin and end of every eclipse that a satellite meets, coasting under J2 from now on.
+    """Begin and end of every eclipse of a satellite that coasts under J2.
 
-    The plant's own shadow and its own rule: dark is where any of the Sun is hidden. One that is under way
+    Same shadow as in the plant: an eclipse lasts while any of the Sun's disc is hidden. An eclipse in progress
     begins now; one that outlasts `duration` ends with it; one shorter than `step` may be missed.
 
     Args:
         state: inertial, (6,), m and m/s.
-        duration: time to look ahead, s.
-        step: s, between points of the orbit; a cubic joins them, 3 cm off at 1/180 of a revolution in LEO.
+        duration: length of the forecast, s.
+        step: interval of the propagated states, s; a cubic in between is within 3 cm at 1/180 of a revolution in
+            LEO.
         epoch: now, Terrestrial Time since J2000.0, s.
 
     Returns:
-        (N, 2), s from now, in the order of time.
+        (N, 2), s from now, in order of time.
 
     Raises:
         ImpactError: the orbit meets the Earth.
@@ -37,7 +38,7 @@ def eclipses(state: Array, duration: float, step: float, epoch: float = 0.0) -> 
     dark = [propagator.illumination(index * step, each) < 1.0 for index, each in enumerate(states)]
 
     def crossing(index: int) -> float:
-        """When light turns to shadow or back between a point and the next."""
+        """Time of the shadow's edge between a point and the next, by bisection."""
         first, last = 0.0, step
         while last - first > PRECISION:
             middle = 0.5 * (first + last)
@@ -54,10 +55,10 @@ def eclipses(state: Array, duration: float, step: float, epoch: float = 0.0) -> 
     return np.array(bounds).reshape(-1, 2)
 
 
-def _between(start: Array, end: Array, share: float, step: float) -> Array:
-    """Position (3,) at a share of the step between two states: Hermite's cubic."""
-    rest = 1.0 - share
-    position: Array = rest * rest * ((1.0 + 2.0 * share) * start[:3] + share * step * start[3:]) + share * share * (
-        (1.0 + 2.0 * rest) * end[:3] - rest * step * end[3:]
-    )
+def _between(start: Array, end: Array, fraction: float, step: float) -> Array:
+    """Position (3,) at a fraction of the step between two states: Hermite's cubic."""
+    rest = 1.0 - fraction
+    of_start = (1.0 + 2.0 * fraction) * start[:3] + fraction * step * start[3:]
+    of_end = (1.0 + 2.0 * rest) * end[:3] - rest * step * end[3:]
+    position: Array = rest * rest * of_start + fraction * fraction * of_end
     return position

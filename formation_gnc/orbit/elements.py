@@ -1,8 +1,8 @@
 """Keplerian elements and inertial states, singular cases included.
 
-Where an angle is undefined its part goes to the next one that is defined, as is usual: for a circular orbit
-the argument of perigee is zero and the true anomaly is counted from the ascending node; for an equatorial
-one, prograde or retrograde, the right ascension is zero and the node is taken on the inertial x axis.
+Usual conventions where an angle is undefined: on a circular orbit the argument of perigee is zero and the true
+anomaly is counted from the ascending node; on an equatorial one, prograde or retrograde, the right ascension is
+zero and the node lies on the inertial x axis.
 """
 
 from dataclasses import dataclass, fields
@@ -17,7 +17,7 @@ from formation_gnc.orbit.constants import EARTH_RADIUS, MU
 Array = NDArray[np.float64]
 
 SINGULAR = 1e-13
-"""Eccentricity, or sine of inclination, below which a direction drowns in rounding and goes by convention."""
+"""Eccentricity, or sine of inclination, below which a direction is rounding error and set by convention."""
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,8 @@ class Elements:
     """Keplerian elements of a closed orbit about the Earth: metres and radians.
 
     Raises:
-        OrbitError: for values that are not finite, open orbits, perigees below the Earth's surface
-        and
-            inclinations outside [0, pi].
+        OrbitError: values that are not finite, an open orbit, a perigee below the Earth's surface, or an
+            inclination outside [0, pi].
     """
 
     semi_major_axis: float
@@ -38,7 +37,7 @@ class Elements:
     true_anomaly: float
 
     def __post_init__(self) -> None:
-        """Reject what is not a closed orbit clear of the Earth."""
+        """Reject open orbits and those that meet the Earth."""
         for field in fields(self):
             value = getattr(self, field.name)
             if not isfinite(value):
@@ -108,9 +107,8 @@ def elements_from_state(state: Array, mu: float = MU) -> Elements:
         mu: gravitational parameter, m^3/s^2.
 
     Raises:
-        OrbitError: for states that are not finite, of zero radius, rectilinear, or on an open orbit
-        or
-            one that meets the Earth's surface.
+        OrbitError: a state that is not finite, of zero radius, rectilinear, or on an orbit that is open or meets
+            the Earth's surface.
     """
     values = [float(value) for value in state]
     if len(values) != 6 or not all(isfinite(value) for value in values):
@@ -149,13 +147,13 @@ def elements_from_state(state: Array, mu: float = MU) -> Elements:
 
 
 def wrap(angle: float) -> float:
-    """Angle brought into [0, 2 pi), rad."""
+    """Angle in [0, 2 pi), rad."""
     wrapped = angle % tau
     return 0.0 if wrapped == tau else wrapped
 
 
 def eccentric_anomaly(mean_anomaly: float, eccentricity: float) -> float:
-    """Solution E of Kepler's equation ``M = E - e sin E``, to rounding.
+    """Solution E of Kepler's equation ``M = E - e sin E``, to rounding error.
 
     Args:
         mean_anomaly: M, rad, any number of turns.
@@ -165,13 +163,13 @@ def eccentric_anomaly(mean_anomaly: float, eccentricity: float) -> float:
         E, rad, on the same turn as M.
 
     Raises:
-        OrbitError: for an eccentricity outside [0, 1).
+        OrbitError: an eccentricity outside [0, 1).
     """
     if not 0.0 <= eccentricity < 1.0:
         raise OrbitError(f"eccentricity is {eccentricity}: it must be in [0, 1)")
     turns = tau * round(mean_anomaly / tau)
     target = mean_anomaly - turns
-    # The function is monotonic: Newton's steps kept in a shrinking bracket always arrive, at e near 1 too.
+    # Monotonic function: Newton's method inside a shrinking bracket converges for every e.
     low, high = (0.0, pi) if target >= 0.0 else (-pi, 0.0)
     anomaly = min(max(target + eccentricity * sin(target), low), high)
     for _ in range(100):

@@ -1,16 +1,15 @@
 """Inertial frame and the chief's Hill frame.
 
-An inertial state is ``[r, v]``, six numbers in m and m/s, Earth-centred. The Hill frame sits on the chief: x
-radial outwards, y along-track, z along the orbit normal ``r x v``. Written out by component, since these run
-at every tick.
+An inertial state is ``[r, v]``, six numbers in m and m/s, Earth-centred. The Hill frame is centred on the
+chief: x radial outwards, y along-track, z along the orbit normal ``r x v``. Written out by component for speed:
+these functions run at every tick.
 
-Convention: relative velocities are those seen in a frame that turns at ``h / r^2`` about the orbit normal.
-That rate follows from the chief's position and velocity alone, whatever the orbit's eccentricity, so the
-transformation is the same for every force model and inverts exactly. An out-of-plane acceleration ``a_z``
-also tilts the orbit plane, at ``r a_z / h`` about the radial axis (J2 in LEO: up to about 1e-6 rad/s, 0.1
-mm/s at 100 m); the velocities here leave that tilt out, and so differ from the time derivative of the Hill
-coordinates by its cross product with the position. `hill_angular_velocity` gives the whole of it for models
-that need it.
+Convention: relative velocities are those in a frame that rotates at ``h / r^2`` about the orbit normal. That
+rate follows from the chief's position and velocity alone, at any eccentricity, so the transformation is the same
+for every force model and inverts exactly. An out-of-plane acceleration ``a_z`` also tilts the orbit plane, at
+``r a_z / h`` about the radial axis (J2 in LEO: up to about 1e-6 rad/s, 0.1 mm/s at 100 m). The velocities here
+exclude that tilt, and so differ from the time derivative of the Hill coordinates by its cross product with the
+position. `hill_angular_velocity` includes it.
 """
 
 from math import sqrt
@@ -26,7 +25,7 @@ Array = NDArray[np.float64]
 
 @inline
 def hill_frame(chief: Array) -> tuple[Array, float]:
-    """`hill_rotation` and `hill_rate` for use inside kernels; not numbers where there is no orbit plane."""
+    """`hill_rotation` and `hill_rate` for use inside kernels; NaN where there is no orbit plane."""
     rx, ry, rz, vx, vy, vz = chief[0], chief[1], chief[2], chief[3], chief[4], chief[5]
     hx, hy, hz = ry * vz - rz * vy, rz * vx - rx * vz, rx * vy - ry * vx
     square = rx * rx + ry * ry + rz * rz
@@ -51,7 +50,7 @@ def hill_rotation(chief: Array) -> Array:
         (3, 3); its rows are the Hill axes x, y, z in inertial components.
 
     Raises:
-        OrbitError: if the chief has no orbit plane (zero radius or rectilinear motion).
+        OrbitError: no orbit plane (zero radius or rectilinear motion).
     """
     rx, ry, rz, vx, vy, vz = map(float, chief)
     hx, hy, hz = ry * vz - rz * vy, rz * vx - rx * vz, rx * vy - ry * vx
@@ -70,7 +69,7 @@ def hill_rotation(chief: Array) -> Array:
 
 
 def hill_rate(chief: Array) -> float:
-    """Rate at which the Hill frame turns about the orbit normal, ``h / r^2``, rad/s.
+    """Rate of the Hill frame about the orbit normal, ``h / r^2``, rad/s.
 
     Args:
         chief: inertial state of the chief, (6,), m and m/s.
@@ -81,11 +80,11 @@ def hill_rate(chief: Array) -> float:
 
 
 def hill_angular_velocity(chief: Array, acceleration: Array) -> Array:
-    """Angular velocity of the Hill frame with the tilt of the orbit plane, in Hill components.
+    """Angular velocity of the Hill frame, tilt of the orbit plane included, in Hill components.
 
     Args:
         chief: inertial state of the chief, (6,), m and m/s.
-        acceleration: its whole inertial acceleration, (3,), m/s^2.
+        acceleration: its total inertial acceleration, (3,), m/s^2.
 
     Returns:
         (3,) ``[r a_z / h, 0, h / r^2]``, rad/s.
@@ -98,7 +97,7 @@ def hill_angular_velocity(chief: Array, acceleration: Array) -> Array:
 
 @kernel((ANY_VECTOR, ANY_MATRIX, ANY_VECTOR))
 def inertial_acceleration(chief: Array, forces: Array, masses: Array) -> Array:
-    """Accelerations by forces along the chief's Hill axes.
+    """Inertial accelerations by forces along the chief's Hill axes.
 
     Args:
         chief: inertial state of the chief, (6,), m and m/s.
@@ -120,7 +119,7 @@ def inertial_acceleration(chief: Array, forces: Array, masses: Array) -> Array:
 def hill_transform(chief: Array) -> Array:
     """Transformation of inertial differences (deputy minus chief) to relative states in the Hill frame.
 
-    Linear and exact for states of any size; a covariance P of the difference becomes ``T P T'``.
+    Linear, and exact at any separation; a covariance P of the difference becomes ``T P T'``.
 
     Args:
         chief: inertial state of the chief, (6,), m and m/s.

@@ -1,4 +1,4 @@
-"""The Earth's attraction as a point mass with J2, and its gradient: what the navigation filter flies with."""
+"""Gravity of the point mass with J2, and its gradient: the model of filters and plans."""
 
 from math import sqrt
 
@@ -14,7 +14,7 @@ _J2_STRENGTH = 1.5 * J2 * MU * EARTH_RADIUS**2
 
 @inline
 def oblate_acceleration(x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Acceleration of the point mass with J2, component-wise, m/s^2."""
+    """Acceleration by the point mass with J2, component-wise, m/s^2."""
     r2 = x * x + y * y + z * z
     r = sqrt(r2)
     central = MU / (r2 * r)
@@ -47,10 +47,10 @@ def oblate_gradient(x: float, y: float, z: float) -> tuple[float, float, float, 
 
 @kernel(float64[::1](ANY_VECTOR))
 def acceleration(position: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Acceleration of the point mass with J2.
+    """Acceleration by the point mass with J2.
 
     Args:
-        position: inertial, (3,), m; the first three of a state will do.
+        position: inertial, (3,), m, or the state it begins, (6,).
 
     Returns:
         (3,), m/s^2, inertial.
@@ -62,7 +62,7 @@ def acceleration(position: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @kernel(float64[:, ::1](ANY_VECTOR))
 def gradient(position: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Gradient of `acceleration` with respect to position; symmetric and without trace.
+    """Gradient of `acceleration` with respect to position; symmetric and traceless.
 
     Args:
         position: inertial, (3,), m.

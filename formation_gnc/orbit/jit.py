@@ -1,4 +1,4 @@
-"""Compilation of the hot loops, cached on disk so that a process starts fast.
+"""Compilation of the hot loops, cached on disk for fast starts of processes.
 
 Numba validates a cached kernel against its own source file only, not against callees and constants of other
 files. The cache directory is therefore keyed by the content of every folder that its kernels are built from.
@@ -20,7 +20,7 @@ ANY_VECTOR = numba.types.Array(numba.float64, 1, "A", readonly=True)
 """Numba type of a vector argument, contiguous or not, writable or not."""
 
 ANY_MATRIX = numba.types.Array(numba.float64, 2, "A", readonly=True)
-"""The same of a matrix."""
+"""Numba type of a matrix argument, likewise."""
 
 SOURCES = {
     "orbit": ("orbit",),
@@ -34,7 +34,7 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def _cache_directory(folder: str, key: str = "") -> str:
-    """First writable place for the compiled kernels of a folder, or an empty string when there is none."""
+    """First writable directory for the compiled kernels of a folder; empty when there is none."""
     digest = sha256(key.encode())
     for source in (source for each in SOURCES[folder] for source in sorted((_PACKAGE / each).rglob("*.py"))):
         digest.update(source.read_bytes())
@@ -61,13 +61,13 @@ def _folder(function: Callable[..., Any]) -> str:
 
 
 def kernel[F: Callable[..., Any]](signature: Any, key: str = "") -> Callable[[F], F]:
-    """Compile a function, when its module is imported, for exactly this signature.
+    """Decorator: compile a function at import, for exactly this signature.
 
     Without fastmath and threads: the same input gives the same bits. Division by zero follows IEEE 754.
 
     Args:
-        signature: numba signature; arguments of other types are rejected, layouts are as declared.
-        key: digest of what the function calls outside the folders of `SOURCES`.
+        signature: numba signature; arguments of other types or layouts are rejected.
+        key: digest of the sources that the function calls outside the folders of `SOURCES`.
     """
 
     def compile_function(function: F) -> F:
@@ -83,9 +83,9 @@ def kernel[F: Callable[..., Any]](signature: Any, key: str = "") -> Callable[[F]
 
 
 def inline[F: Callable[..., Any]](function: F) -> F:
-    """Compile a function for use inside kernels, into which it is always inlined.
+    """Decorator: compile a function for use inside kernels, into which it is always inlined.
 
-    Fast with scalars and tuples as arguments; arrays cost more.
+    Scalars and tuples as arguments and results stay in registers; arrays do not.
     """
     compiled: F = numba.njit(error_model="numpy", forceinline=True)(function)
     return compiled

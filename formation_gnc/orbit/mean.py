@@ -1,10 +1,10 @@
-"""Mean elements: osculating ones freed of the short-period wobble of J2.
+"""Mean elements: osculating ones without the short-period perturbations of J2.
 
-Brouwer's first-order theory in the form of a Lie transformation: osculating states are the mean ones moved
-along the flow of a generating function W for unit time. W satisfies ``n dW/dl = H1 - <H1>`` for the J2 part
-H1 of the energy and its mean over the mean anomaly l. Written in position and velocity it has no singular
-case, circular, equatorial or other, and the flow runs backwards exactly, so the transformation inverts to
-rounding. Long-period terms stay in: at the critical inclination nothing is divided by zero.
+Brouwer's first-order theory as a Lie transformation: osculating states are the mean ones after unit time along
+the flow of a generating function W, with ``n dW/dl = H1 - <H1>`` for the J2 part H1 of the energy and its mean
+over the mean anomaly l. In position and velocity it has no singularity at circular or equatorial orbits, and the
+flow is reversible, so the transformation inverts to rounding error. Long-period terms are kept, which avoids the
+singularity at the critical inclination.
 
 Derivation: docs/theory/orbits.md.
 """
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 def mean_elements(osculating: Elements) -> Elements:
-    """Mean elements under J2: they drift at `secular_rates`, up to terms of the order of J2 squared.
+    """Mean elements under J2, which drift at `secular_rates` up to terms of order J2 squared.
 
     Args:
         osculating: Keplerian elements.
@@ -61,7 +61,7 @@ def secular_rates(mean: Elements) -> tuple[float, float, float]:
 
 
 def _generating_function(states: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """W of states (6, K), m^2/s; analytic, so that complex steps differentiate it exactly."""
+    """W of states (6, K), m^2/s; analytic, for differentiation by complex steps."""
     rx, ry, rz, vx, vy, vz = states
     r = np.sqrt(rx * rx + ry * ry + rz * rz)
     h = np.sqrt((ry * vz - rz * vy) ** 2 + (rz * vx - rx * vz) ** 2 + (rx * vy - ry * vx) ** 2)
@@ -82,14 +82,14 @@ def _generating_function(states: NDArray[np.complex128]) -> NDArray[np.complex12
 
 
 def _velocity(state: Array) -> Array:
-    """Speed of the flow of W: its Hamiltonian vector field, per unit of the flow's parameter."""
+    """Hamiltonian vector field of W at a state (6,)."""
     steps = 1e-30 * np.array([1e7, 1e7, 1e7, 1e4, 1e4, 1e4])
     slopes = _generating_function(state[:, None] + 1j * np.diag(steps)).imag / steps
     return np.concatenate((slopes[3:], -slopes[:3]))
 
 
 def _flow(state: Array, duration: float) -> Array:
-    """Runge-Kutta's classical method in two steps: each error is of the fifth order in J2."""
+    """State after a time along the flow, by two classical Runge-Kutta steps: errors are of order J2^5."""
     now, step = np.array(state, dtype=np.float64), 0.5 * duration
     for _ in range(2):
         first = _velocity(now)

@@ -1,7 +1,7 @@
 """Explicit Runge-Kutta method of order eight in eleven stages (Cooper and Verner 1972).
 
-Its coefficients are closed expressions in the square root of 21, the nodes those of Lobatto's quadrature:
-only five distinct instants per step, so what depends on time alone is evaluated five times for eleven stages.
+Coefficients in closed form in the square root of 21, with the nodes of Lobatto's quadrature: only five distinct
+instants per step, so that functions of time alone are evaluated five times for eleven stages.
 """
 
 from math import sqrt
@@ -13,7 +13,7 @@ _S = sqrt(21.0)
 STAGES = 11
 
 INSTANTS = np.array([0.0, 0.5, (7.0 + _S) / 14.0, (7.0 - _S) / 14.0, 1.0])
-"""The distinct nodes, in fractions of the step."""
+"""Distinct nodes, in fractions of the step."""
 
 INSTANT_OF_STAGE = np.array([0, 1, 1, 2, 2, 1, 3, 3, 1, 2, 4])
 """Index into `INSTANTS` of every stage."""
@@ -21,7 +21,7 @@ INSTANT_OF_STAGE = np.array([0, 1, 1, 2, 2, 1, 3, 3, 1, 2, 4])
 WEIGHTS = np.array([1 / 20, 0, 0, 0, 0, 0, 0, 49 / 180, 16 / 45, 49 / 180, 1 / 20])
 
 COUPLING = np.zeros((STAGES, STAGES))
-"""Strictly lower triangular: row i weighs the earlier derivatives in the argument of stage i."""
+"""Strictly lower triangular: row i has the weights of the earlier derivatives in the argument of stage i."""
 
 COUPLING[1, :1] = [1 / 2]
 COUPLING[2, :2] = [1 / 4, 1 / 4]

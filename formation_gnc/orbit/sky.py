@@ -1,9 +1,9 @@
-"""Where Sun and Moon are and how far the Earth has turned: low-precision series in the J2000 frame.
+"""Low-precision ephemerides of Sun and Moon, and the Earth's rotation angle, in the J2000 frame.
 
 Time is in seconds of Terrestrial Time since J2000.0 (2000-01-01 12:00 TT), positions are geocentric. Sun and
-Moon after O. Montenbruck and E. Gill, Satellite Orbits, section 3.3.2. The Earth's axis is held along z of
-J2000: precession and nutation (0.14 deg by 2025) are left out, and universal time is taken as ``TT - 69.184
-s``, right to a second since 2017 and until the next leap second.
+Moon after O. Montenbruck and E. Gill, Satellite Orbits, section 3.3.2. The Earth's axis is fixed along z of
+J2000: precession and nutation (0.14 deg by 2025) are neglected, and universal time is ``TT - 69.184 s``, correct
+to a second since 2017 until the next leap second.
 """
 
 from math import cos, floor, pi, sin, tau
@@ -17,11 +17,11 @@ ASTRONOMICAL_UNIT = 149597870700.0
 """Metre, IAU 2012."""
 
 SUN, MOON, EARTH_ROTATION = 1, 2, 4
-"""Ephemerides that a force may need, as bits."""
+"""Ephemerides, as bits of what a force needs."""
 
 EPHEMERIDES = 8
-"""Length of the array of all ephemerides at one time: position of the Sun (3,) and of the Moon (3,), m, cosine and
-sine of the Earth's rotation angle."""
+"""Number of ephemeris values at one time: positions of Sun and Moon (3 each), m, then cosine and sine of the
+Earth's rotation angle."""
 
 _CENTURY = 36525.0 * 86400.0
 _ARCSECOND = pi / 648000.0
@@ -111,7 +111,7 @@ def earth_rotation_angle(time: float) -> float:
 
 @inline
 def look_up(needed: int, time: float, ephemerides: NDArray[np.float64]) -> None:
-    """Fill in the ephemerides `needed` (bits) at a time, s; the others stay as they are."""
+    """Fill the `needed` (bits) of the ephemerides at a time, s; the others keep their values."""
     if needed & SUN:
         ephemerides[0], ephemerides[1], ephemerides[2] = sun(time)
     if needed & MOON:

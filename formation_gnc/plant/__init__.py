@@ -1,1 +1,1 @@
-"""Truth of chief and deputies, sensors, thrusters."""
+"""Truth of chief and deputies: propagation, thrusters, sensor readings."""

@@ -1,4 +1,4 @@
-"""What a deputy's thrusters make of a command."""
+"""Thrusters of a deputy: the force applied for a commanded one."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,14 +7,14 @@ from math import copysign, exp, hypot, isfinite
 
 import numpy as np
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import ParameterError
 from formation_gnc.parameters import parameter
 from formation_gnc.types import Vector
 
 NO_FORCE = (0.0, 0.0, 0.0)
 
 STANDARD_GRAVITY = 9.80665
-"""By which specific impulse is counted, m/s^2."""
+"""Defines specific impulse in seconds, m/s^2."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class ThrusterParameters:
 
 
 class Denial(StrEnum):
-    """Why a thruster did not give what was asked."""
+    """Why the applied force differs from the command."""
 
     NOT_FINITE = "command not finite"
     ECLIPSE = "eclipse"
@@ -73,24 +73,24 @@ class Denial(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class ThrusterState:
-    """What a thruster remembers from tick to tick."""
+    """State of a thruster between ticks."""
 
     mass: float
     """Of the whole satellite, kg."""
     output: tuple[float, float, float] = NO_FORCE
-    """Memory of the lag: force at the end of the tick, before noise and misalignment, N."""
+    """State of the lag: force at the end of the tick, before noise and misalignment, N."""
 
 
 class Thruster:
     """Force of a deputy's thrusters over a tick.
 
-    In this order: a command that is not finite, in eclipse (if so configured) or with an empty tank gives no
-    force at once; a failed axis none on that axis. The rest is limited, rounded to the quantum, dropped where
-    it is too small, delayed by the lag, disturbed by noise and turned by the misalignment. The force is the
-    mean over the tick, so that the impulse is exact with a lag too. When the tank runs dry within a tick, the
-    force is what the rest can give.
+    In this order: a command that is not finite, eclipse (if configured) or an empty tank cuts all thrust at
+    once, a failed axis its own. The rest is limited, rounded to the quantum, dropped where it is too small,
+    delayed by the lag, disturbed by noise and rotated by the misalignment. The force is the mean over the tick,
+    so that the impulse is exact with a lag too. When the tank runs dry within a tick, the force is that of the
+    remaining propellant.
 
-    Assumes: thrusters fixed to the Hill axes, an exhaust of one velocity.
+    Assumes: thrusters fixed to the Hill axes, constant exhaust velocity.
     """
 
     def __init__(self, parameters: ThrusterParameters, tick: float, generator: np.random.Generator) -> None:
@@ -99,14 +99,14 @@ class Thruster:
         Args:
             parameters: may be replaced in flight; the misalignment is drawn here, once.
             tick: s.
-            generator: of this deputy's thrusters alone; drawn from here, and at every tick if there is noise.
+            generator: random numbers of this deputy's thrusters alone.
 
         Raises:
-            ConfigurationError: a quantum that leaves nothing to fire, or is too fine to count.
+            ParameterError: a quantum above the largest force, or too fine to count.
         """
         largest = max(*parameters.limit, parameters.total_limit)
         if parameters.quantum and not 1e-9 * largest <= parameters.quantum <= largest:
-            raise ConfigurationError(
+            raise ParameterError(
                 f"parameter quantum: {parameters.quantum!r} N is not allowed; "
                 f"it must be 0 or from {1e-9 * largest:g} to the largest force, {largest:g}"
             )
@@ -115,18 +115,18 @@ class Thruster:
         self._mounting = _rotation(parameters.misalignment * generator.standard_normal(3))
 
     def start(self, mass: float) -> ThrusterState:
-        """State of a satellite that has not fired yet.
+        """State before the first tick.
 
         Args:
             mass: with propellant, kg.
 
         Raises:
-            ConfigurationError: a mass that is not above zero, or below the dry mass.
+            ParameterError: a mass that is not above zero, or below the dry mass.
         """
         if not (isfinite(mass) and mass > 0.0):
-            raise ConfigurationError(f"parameter mass: {mass!r} kg is not allowed; it must be above 0")
+            raise ParameterError(f"parameter mass: {mass!r} kg is not allowed; it must be above 0")
         if mass < self.parameters.dry_mass:
-            raise ConfigurationError(
+            raise ParameterError(
                 f"parameter mass: {mass!r} kg is not allowed; it must be at least the dry mass, "
                 f"{self.parameters.dry_mass!r} kg"
             )
@@ -138,14 +138,13 @@ class Thruster:
         """Fire for one tick.
 
         Args:
-            command: force asked for, (3,), Hill frame, N.
+            command: commanded force, (3,), Hill frame, N.
             eclipse: whether any of the Sun is hidden.
             state: at the start of the tick.
 
         Returns:
-            The force given, (3,), Hill frame, N, to be held over the tick with the mass at its start; the
-            state at its end; and why the force differs from the command beyond lag, rounding, noise and
-            misalignment.
+            The applied force, (3,), Hill frame, N, held over the tick with the mass at its start; the state at
+            its end; and why the force differs from the command beyond lag, rounding, noise and misalignment.
         """
         limits = self.parameters
         noise = self._generator.standard_normal(3) if limits.magnitude_noise > 0.0 else None
@@ -154,16 +153,16 @@ class Thruster:
             return NO_FORCE, ThrusterState(state.mass), (denial,) if any(command) else ()
         force, reasons = self._valves(command)
         if limits.lag > 0.0:
-            force, end = self._rise(state.output, force)
+            force, end = self._lagged(state.output, force)
             state = ThrusterState(state.mass, end)
         if noise is not None:
             force = [f * (1.0 + limits.magnitude_noise * float(n)) for f, n in zip(force, noise, strict=True)]
         if limits.specific_impulse > 0.0:
-            mass, share = self._burn(force, state.mass)
+            mass, fraction = self._burn(force, state.mass)
             state = ThrusterState(mass, state.output)
-            if share < 1.0:
+            if fraction < 1.0:
                 reasons += (Denial.EMPTY,)
-                force, state = [f * share for f in force], ThrusterState(mass)
+                force, state = [f * fraction for f in force], ThrusterState(mass)
         if limits.misalignment > 0.0:
             force = (self._mounting @ np.array(force)).tolist()
         return force, state, reasons
@@ -179,7 +178,7 @@ class Thruster:
         return None
 
     def _valves(self, command: Sequence[float]) -> tuple[list[float], tuple[Denial, ...]]:
-        """What the valves are set to, and what was denied on the way."""
+        """Force (3,) that the valves are set to, N, and what was denied of the command."""
         limits = self.parameters
         reasons: list[Denial] = []
         output: list[float] = []
@@ -209,7 +208,7 @@ class Thruster:
             output[axis] = copysign(level, value)
         return output, tuple(dict.fromkeys(reasons)) if reasons else ()
 
-    def _rise(
+    def _lagged(
         self, before: tuple[float, float, float], output: list[float]
     ) -> tuple[list[float], tuple[float, float, float]]:
         """Mean force over the tick, and the force at its end, of a first-order lag."""
@@ -220,10 +219,10 @@ class Thruster:
         x, y, z = (to + (now - to) * left for now, to in zip(before, output, strict=True))
         return given, (x, y, z)
 
-    def _burn(self, given: list[float], mass: float) -> tuple[float, float]:
-        """Mass after the tick, and the share of the force that the propellant lasts for."""
+    def _burn(self, force: list[float], mass: float) -> tuple[float, float]:
+        """Mass after the tick, kg, and the fraction of the force that the propellant is enough for."""
         limits = self.parameters
-        thrust = hypot(*given) if limits.total_limit > 0.0 else sum(abs(force) for force in given)
+        thrust = hypot(*force) if limits.total_limit > 0.0 else sum(abs(each) for each in force)
         needed = thrust * self._tick / (limits.specific_impulse * STANDARD_GRAVITY)
         if needed <= mass - limits.dry_mass:
             return mass - needed, 1.0

@@ -1,1 +1,1 @@
-"""Relative-motion models, one file per model."""
+"""Relative-motion models, one file a model, one registry."""

@@ -1,4 +1,4 @@
-"""The chief's motion, as the equations of relative motion need it.
+"""Motion of the chief, for the equations of relative motion.
 
 `KeplerChief` is an ellipse in closed form; `OblateChief` is an orbit under J2, integrated.
 """
@@ -28,12 +28,12 @@ STEPS_PER_TURN = 200
 """Integration steps per revolution of a circular orbit at the perigee: rounding error at order eight."""
 
 LATEST = 2048
-"""States of chiefs that are kept."""
+"""Size of the caches of chief states."""
 
 
 @dataclass(frozen=True)
 class ChiefState:
-    """Where the chief is and how its Hill frame turns, at one instant, or, in arrays (...,), at many."""
+    """Radius of the chief and rotation of its Hill frame at one instant, or, in arrays (...,), at many."""
 
     mu: float
     """Gravitational parameter, m^3/s^2."""
@@ -50,10 +50,10 @@ class ChiefState:
 
 
 def frame_matrix(chief: ChiefState) -> Array:
-    """(..., 6, 6) part of A that comes from the turning of the Hill frame alone, without any gravity.
+    """(..., 6, 6) part of A due to the rotation of the Hill frame alone, without gravity.
 
-    Its in-plane rates are those of Joshi (3.22). The tilt of the orbit plane, which J2 causes, enters because
-    the relative velocity of `formation_gnc.orbit.frames` leaves it out: docs/theory/relative-motion.md.
+    The in-plane rates are those of Joshi (3.22). The tilt of the orbit plane under J2 enters because the relative
+    velocity of `formation_gnc.orbit.frames` excludes it: docs/theory/relative-motion.md.
     """
     rate, tilt = chief.angular_rate, chief.tilt_rate
     matrix = np.zeros((*np.shape(rate), 6, 6))
@@ -71,14 +71,14 @@ def frame_matrix(chief: ChiefState) -> Array:
 
 
 class Chief(ABC):
-    """An orbit that gives the chief's state at any time; values compare equal when the orbits do."""
+    """Orbit of the chief; instances of equal orbits compare equal."""
 
     @abstractmethod
     def at(self, time: float) -> ChiefState:
         """State at a time (s)."""
 
     def along(self, times: Array) -> ChiefState:
-        """States at times (N,), in arrays."""
+        """States at times (N,), s, in arrays."""
         states = [self.at(float(time)) for time in times]
         columns = {
             each.name: np.array([getattr(state, each.name) for state in states])
@@ -90,24 +90,24 @@ class Chief(ABC):
     @property
     @abstractmethod
     def period(self) -> float:
-        """Time (s) in which the argument of latitude advances by a full turn."""
+        """Period of the argument of latitude, s."""
 
     @property
     @abstractmethod
     def longest_step(self) -> float:
-        """Integration step (s) that keeps rounding error, set by the motion at the perigee."""
+        """Longest step of an integration to rounding error, s, set by the motion at the perigee."""
 
 
 @dataclass(frozen=True)
 class KeplerChief(Chief):
-    """A chief on an ellipse: point-mass gravity, closed form.
+    """A chief on an ellipse, under point-mass gravity, in closed form.
 
-    The orientation only matters to models with J2. Nothing is checked against the Earth's surface: Joshi's
-    Table 8.2 has a perigee below it.
+    Only models with J2 depend on the orientation. A perigee below the Earth's surface is accepted, as in Joshi's
+    Table 8.2.
 
     Raises:
-        OrbitError: for a value that is not finite, a semi-major axis or gravitational parameter
-            that is not positive, or an eccentricity outside [0, 1).
+        OrbitError: a value that is not finite, a semi-major axis or gravitational parameter that is not positive,
+            or an eccentricity outside [0, 1).
     """
 
     semi_major_axis: float
@@ -119,7 +119,7 @@ class KeplerChief(Chief):
     mu: float = MU
 
     def __post_init__(self) -> None:
-        """Reject what is no ellipse."""
+        """Reject what is not an ellipse."""
         for name, value in vars(self).items():
             if not math.isfinite(value):
                 raise OrbitError(f"{name} is {value}: it must be finite")
@@ -142,7 +142,7 @@ class KeplerChief(Chief):
 
     @property
     def mean_motion(self) -> float:
-        """Mean angular rate, rad/s."""
+        """Mean motion, rad/s."""
         return math.sqrt(self.mu / self.semi_major_axis**3)
 
     @property
@@ -152,12 +152,12 @@ class KeplerChief(Chief):
 
     @property
     def period(self) -> float:
-        """Time of one revolution, s."""
+        """Period of revolution, s."""
         return math.tau / self.mean_motion
 
     @property
     def longest_step(self) -> float:
-        """Integration step (s) that keeps rounding error, set by the motion at the perigee."""
+        """Longest step of an integration to rounding error, s, set by the motion at the perigee."""
         return _step_at(self.semi_major_axis * (1.0 - self.eccentricity), self.mu)
 
     def anomaly(self, time: float) -> float:
@@ -183,11 +183,11 @@ class OblateChief(Chief):
 
     @property
     def longest_step(self) -> float:
-        """Integration step (s) that keeps rounding error, set by the motion at the perigee."""
+        """Longest step of an integration to rounding error, s, set by the motion at the perigee."""
         return _step_at(self.elements.perigee_radius, MU)
 
     def inertial(self, time: float) -> Array:
-        """(6,) inertial state at a time: the same bits whatever was asked before."""
+        """(6,) inertial state at a time, s; the same bits in any order of calls."""
         return _oblate_inertial(self, time)
 
     def at(self, time: float) -> ChiefState:
@@ -199,7 +199,7 @@ def _step_at(perigee_radius: float, mu: float) -> float:
     return math.tau / STEPS_PER_TURN * math.sqrt(perigee_radius**3 / mu)
 
 
-# Integrations ask for the same instants again and again, plans for hundreds of them: the last ones are kept.
+# Cached: integrations evaluate the same instants repeatedly, plans hundreds of them.
 @lru_cache(maxsize=LATEST)
 def _kepler_state(chief: KeplerChief, time: float) -> ChiefState:
     anomaly = chief.anomaly(time)
@@ -246,7 +246,7 @@ def _oblate_state(chief: OblateChief, time: float) -> ChiefState:
 
 @lru_cache(maxsize=64)
 def _oblate_inertial(chief: OblateChief, time: float) -> Array:
-    """Integrate over the rest of a step from the last knot before the time."""
+    """Integrate from the last knot before the time."""
     step = chief.longest_step
     index = max(math.floor(time / step), 0)
     knots = _knots(chief)
@@ -260,15 +260,15 @@ def _oblate_inertial(chief: OblateChief, time: float) -> Array:
 
 @lru_cache(maxsize=16)
 def _knots(chief: OblateChief) -> list[Array]:
-    """States at multiples of the longest step, as far as they were asked for."""
+    """States at multiples of the longest step, extended on demand."""
     return [state_from_elements(chief.elements)]
 
 
 @lru_cache(maxsize=16)
 def _nodal_period(chief: OblateChief) -> float:
-    """Time at which the chief is back at the initial pole direction, by Newton's method on the angle."""
+    """Time at which the pole is in its initial direction again, by Newton's method on the angle."""
     start = chief.at(0.0).pole
-    equatorial = math.hypot(start[0], start[1]) < 1e-9  # no node: count from the inertial x axis
+    equatorial = math.hypot(start[0], start[1]) < 1e-9  # no node: angle from the initial position
     period = chief.elements.period
 
     def excess(time: float) -> float:

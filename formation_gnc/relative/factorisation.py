@@ -1,9 +1,8 @@
 """State-dependent factorisations f(x) = A(x) x of the nonlinear equations of relative motion.
 
-Joshi's SDC1 and SDC2, and SDC1 with J2: the matrices that the state-dependent Riccati equation works with.
-They are factorisations to rounding error at every state, the chief itself included: where the source sums a
-truncated series, the closed form of the series stands here. All take states (..., 6) with one state of the
-chief, or one each, and give (..., 6, 6).
+Joshi's SDC1 and SDC2, for the state-dependent Riccati equation, and the factorisation of differential J2. Exact to
+rounding error at every state, that of the chief included: the source's truncated series are in closed form here.
+All take states (..., 6) with one state of the chief, or one each.
 """
 
 import numpy as np
@@ -14,9 +13,9 @@ from formation_gnc.relative.model import Array
 
 
 def sdc1(state: Array, chief: ChiefState) -> Array:
-    """Factorisation of the equations about an eccentric chief: Joshi (5.17)-(5.26), corrected.
+    """(..., 6, 6) factorisation about an eccentric chief: Joshi (5.17)-(5.26), corrected.
 
-    Where the chief's plane tilts under J2, the frame's motion includes it.
+    The rotation of the frame includes the tilt of the chief's orbit plane under J2.
     """
     state = np.asarray(state)
     radius = np.asarray(chief.radius)
@@ -30,11 +29,11 @@ def sdc1(state: Array, chief: ChiefState) -> Array:
 
 
 def sdc2(state: Array, chief: ChiefState) -> Array:
-    """Factorisation of the equations about a circular chief: Joshi (5.28)-(5.32).
+    """(..., 6, 6) factorisation about a circular chief: Joshi (5.28)-(5.32).
 
-    The angular rate stands for the mean motion, as there: for an eccentric chief it is an approximation.
-    The printed sigma_x = (r / x + 1) sigma_y has no limit at x = 0 off the x axis; its numerator is spread
-    over the columns of x, y and z instead, which is the same f(x).
+    With the angular rate for the mean motion, as there: an approximation for an eccentric chief. The printed
+    sigma_x = (r / x + 1) sigma_y has no limit at x = 0 off the x axis; its numerator is distributed over the
+    columns of x, y and z instead, for the same f(x).
     """
     state = np.asarray(state)
     rate, radius = np.asarray(chief.angular_rate), np.asarray(chief.radius)

@@ -1,4 +1,4 @@
-"""Gim and Alfriend's state transition matrix: J2 and an eccentric chief, through differences of elements."""
+"""Gim and Alfriend's state transition matrix for J2 and an eccentric chief, by differences of elements."""
 
 import math
 from dataclasses import dataclass
@@ -17,25 +17,25 @@ from formation_gnc.relative.model import ON_THE_CHIEF, Array, LinearModel
 from formation_gnc.relative.oblate import OblateModel
 
 LOWEST_INCLINATION = 1e-3
-"""Inclination, rad, below which the elements that refer to the node lose too many digits."""
+"""Inclination (rad) below which elements that refer to the node lose too many digits."""
 
 DIFFERENCE = 1e-4
-"""Relative step of the central differences of the short-period perturbations: exact to 1e-10 of them."""
+"""Relative step of the central differences of the short-period perturbations, for a relative error of 1e-10."""
 
 
 @dataclass(frozen=True)
 class GimAlfriendModel(LinearModel):
     """Linear relative motion under J2 about a chief of any eccentricity.
 
-    The state is Sigma times the differences of elements (Joshi (3.49)-(3.51)). Osculating ones are D times
-    those of mean elements, which J2 changes at constant rates: Phi = Sigma D M D^-1 Sigma^-1. The long-period
-    perturbations, singular at the critical inclination, stay in the mean elements, and the chief's own
-    osculating elements are integrated, not taken from the theory: docs/theory/relative-motion.md.
+    The state is Sigma times differences of osculating elements (Joshi (3.49)-(3.51)), which are D times those of
+    mean elements, which in turn change at constant rates under J2: Phi = Sigma D M D^-1 Sigma^-1. Long-period
+    perturbations, singular at the critical inclination, stay in the mean elements. The chief's own osculating
+    elements are integrated instead of taken from the theory: docs/theory/relative-motion.md.
 
-    Assumes: separation much smaller than the radius; no equatorial chief. Its error is of order J2^2.
+    Assumes: separation much smaller than the radius; no equatorial chief. The error is of order J2^2.
 
     Raises:
-        OrbitError: for an inclination within a milliradian of 0 or pi.
+        OrbitError: an inclination within a milliradian of 0 or pi.
     """
 
     has_j2 = True
@@ -58,7 +58,7 @@ class GimAlfriendModel(LinearModel):
 
     @property
     def chief(self) -> OblateChief:
-        """The chief's orbit."""
+        """Orbit of the chief."""
         return OblateChief(self.elements)
 
     @property
@@ -88,7 +88,7 @@ class GimAlfriendModel(LinearModel):
         return self.transition(time, tick), gamma
 
     def bounded(self, time: float, state: Array) -> Array:
-        """(6,) state whose along-track rate makes the mean latitudes, nodes included, keep their distance."""
+        """(6,) state with the along-track rate for which the mean latitudes, nodes included, do not drift apart."""
         mean, matrix = _state_from_mean_elements(self.chief, time)
         slopes = _secular_slopes(mean)
         row = (slopes[1] + math.cos(mean.inclination) * slopes[5]) @ np.linalg.inv(matrix)
@@ -101,8 +101,8 @@ def sigma(orbit: Elements) -> Array:
     """(6, 6) map from differences of elements [a, theta, i, q1, q2, Omega] to the relative state.
 
     Joshi's Sigma(t) in (3.49), (3.50), after Gim and Alfriend's geometry, with q1 = e cos(omega),
-    q2 = e sin(omega) and theta the true argument of latitude. Free of J2, since the relative velocity leaves
-    out the tilt of the plane (`formation_gnc.orbit.frames`).
+    q2 = e sin(omega) and theta the true argument of latitude. Without J2, since the relative velocity excludes
+    the tilt of the plane (`formation_gnc.orbit.frames`).
     """
     theta, q1, q2 = _latitude(orbit)
     sine, cosine = math.sin(theta), math.cos(theta)
@@ -161,7 +161,7 @@ def _state_from_mean_elements(chief: OblateChief, time: float) -> tuple[Elements
     mean = mean_state(osculating)
     size, speed = math.sqrt(mean[:3] @ mean[:3]), math.sqrt(mean[3:] @ mean[3:])
     steps = DIFFERENCE * np.repeat([size, speed], 3)
-    short = np.empty((6, 6))  # derivative of what the short-period perturbations add to an inertial state
+    short = np.empty((6, 6))  # derivative of the short-period perturbations of an inertial state
     for column, step in enumerate(np.diag(steps)):
         ahead, behind = mean + step, mean - step
         added = (osculating_state(ahead) - ahead) - (osculating_state(behind) - behind)

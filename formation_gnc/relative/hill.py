@@ -17,9 +17,9 @@ class HarmonicModel(LinearModel):
 
     x'' = 2 w y' + (4 w^2 - q^2) x + ux,  y'' = -2 w x' + uy,  z'' = -p^2 z + uz
 
-    with the frame's rate w, the in-plane frequency q and the cross-track frequency p. `time` has no effect,
-    and `transition`, `discretise` and `propagate` also take an array of durations (...,) and then give
-    (..., 6, 6), (..., 6, 3) and (..., 6): a whole trajectory in one call.
+    with the frame's rate w, the in-plane frequency q and the cross-track frequency p. `time` has no effect.
+    `transition`, `discretise` and `propagate` also accept durations (...,), for results (..., 6, 6), (..., 6, 3)
+    and (..., 6): a whole trajectory in one call.
     """
 
     is_time_invariant = True
@@ -33,12 +33,12 @@ class HarmonicModel(LinearModel):
 
     @property
     def period(self) -> float:
-        """Time in which the in-plane motion closes, s."""
+        """Period of the in-plane motion, s."""
         return math.tau / self.frequencies[1]
 
     @property
     def longest_step(self) -> float:
-        """Unlimited: closed forms throughout."""
+        """Unlimited: no integration."""
         return math.inf
 
     def phase_rates(self, time: float) -> tuple[float, float]:
@@ -121,20 +121,20 @@ class HarmonicModel(LinearModel):
 
 @dataclass(frozen=True)
 class HillModel(HarmonicModel):
-    """Linear relative motion about a chief on a circular orbit of point-mass gravity.
+    """Linear relative motion about a chief on a circular orbit, under point-mass gravity.
 
     Assumes: circular chief, spherical Earth, separation much smaller than the orbit's radius (the error grows
     with its square). Source: Roberts (9); Kremmydas section 1.1.3 with thrust, in its own axes.
 
     Raises:
-        OrbitError: for a mean motion that is not positive and finite.
+        OrbitError: a mean motion that is not positive and finite.
     """
 
     mean_motion: float
     """Angular rate of the chief, rad/s."""
 
     def __post_init__(self) -> None:
-        """Reject a rate that is not one."""
+        """Reject a mean motion that is not positive and finite."""
         if not (math.isfinite(self.mean_motion) and self.mean_motion > 0.0):
             raise OrbitError(f"mean_motion is {self.mean_motion} rad/s: it must be positive and finite")
 
@@ -150,9 +150,9 @@ class HillModel(HarmonicModel):
 
 
 def _circular_functions(angle: Array) -> tuple[Array, Array, Array, Array]:
-    """Return sin a, cos a, 1 - cos a and a - sin a, the last two to full relative precision.
+    """sin a, cos a, 1 - cos a and a - sin a, the last two without cancellation.
 
-    Over a tick their terms agree to ten digits, which a plain subtraction would lose.
+    Over a tick their terms agree to ten digits, which a subtraction would lose.
     """
     sine = np.sin(angle)
     square = angle**2

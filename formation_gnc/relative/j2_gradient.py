@@ -1,4 +1,4 @@
-"""Roberts' time-varying model: the gradient of J2 along a circular orbit, not averaged."""
+"""Roberts' time-varying model: the gradient of J2 along a circular orbit."""
 
 import math
 from dataclasses import dataclass
@@ -16,9 +16,8 @@ class J2GradientModel(LinearModel):
     """Linear relative motion of two satellites under J2, periodic with the orbit: Roberts (19)-(21), (31).
 
     Includes the corrected orbital rate n c and the nodal correction k. Assumes: near-circular orbits,
-    curvilinear coordinates, separations much smaller than the radius. The gradient acts about a reference
-    that J2 moves on average only; the second-order terms left out make an along-track drift (Roberts, Fig.
-    10).
+    curvilinear coordinates, separations much smaller than the radius. The gradient acts about a reference with
+    mean rates only; the neglected second-order terms cause an along-track drift (Roberts, Fig. 10).
     """
 
     is_periodic = True
@@ -38,7 +37,7 @@ class J2GradientModel(LinearModel):
 
     @property
     def longest_step(self) -> float:
-        """A hundredth of the period, s."""
+        """A hundredth of the nodal period, s."""
         return 0.01 * self.period
 
     def dynamics(self, time: float, state: Array = ON_THE_CHIEF) -> Array:
@@ -55,7 +54,7 @@ class J2GradientModel(LinearModel):
         return matrix
 
     def centred(self, time: float, state: Array) -> Array:
-        """(..., 6) state with the rates of Roberts (32), (33), which belong to the averaged model."""
+        """(..., 6) state with the rates of Roberts (32), (33), which are those of the averaged model."""
         return SchweighartSedwickModel(self.reference).centred(time, state)
 
 

@@ -1,4 +1,4 @@
-"""The nonlinear equations of relative motion and their Jacobian at one state, compiled for loops in time."""
+"""The nonlinear equations of relative motion and their Jacobian at one state, compiled."""
 
 from math import sqrt
 
@@ -16,8 +16,8 @@ Array = NDArray[np.float64]
 def motion(state: Array, acceleration: Array, chief: ChiefState, oblate: bool) -> tuple[Array, Array]:
     """Rate of change (6,) of a relative state (6,) and its Jacobian (6, 6), with J2 or without.
 
-    What `OblateModel` and `NonlinearModel` give: point-mass gravity cancels no digits; of J2, with 10^-3 of
-    it, the last three do not count.
+    The equations of `OblateModel` and `NonlinearModel`. Point-mass gravity is free of cancellation; J2, a
+    thousandth of it, is not.
     """
     strength = 1.5 * J2 * chief.mu * EARTH_RADIUS**2 if oblate else 0.0
     frame = np.array(

@@ -1,11 +1,11 @@
-"""What every relative-motion model can do.
+"""Interface of relative-motion models.
 
-A model describes how a deputy moves relative to a chief: in the chief's Hill frame (x radial outwards, y
-along-track, z along the orbit normal), with the relative state [x, y, z, vx, vy, vz] in m and m/s as
-`formation_gnc.orbit.frames` defines it, and accelerations in m/s^2. Times are seconds of the run. A model
-is a frozen dataclass of its parameters.
+A model describes the motion of a deputy relative to a chief, in the chief's Hill frame (x radial outwards, y
+along-track, z along the orbit normal), with the relative state [x, y, z, vx, vy, vz] in m and m/s as defined in
+`formation_gnc.orbit.frames`, and accelerations in m/s^2. Times are seconds of the run. A model is a frozen
+dataclass of its parameters.
 
-Guidance, navigation and control see only this interface, so that any of them flies with any model.
+Guidance, navigation and control depend on this interface alone.
 """
 
 import math
@@ -33,33 +33,34 @@ ON_THE_CHIEF = _constant(np.zeros(6))
 
 
 class RelativeModel(ABC):
-    """Motion of a deputy relative to a chief; a subclass's docstring states what it assumes.
+    """Motion of a deputy relative to a chief; the docstring of a subclass states its assumptions.
 
-    A model gives `derivative` and `dynamics`; what follows from them is here, by integration to rounding
-    error, and a model with a closed form overrides it.
+    A model defines `about`, `derivative` and `dynamics`. The rest follows by integration to rounding error, and
+    is overridden where a closed form exists. The class variables state what the model is capable of: flight
+    software chooses from `formation_gnc.relative.registry` by them.
     """
 
     INPUT: ClassVar[Array] = INPUT
-    """(6, 3) matrix B by which an acceleration enters: the same for every model."""
+    """(6, 3) input matrix B of an acceleration: the same for every model."""
 
     is_linear: ClassVar[bool]
-    """Whether the right-hand side is `dynamics(t) x + B u`; then `state` arguments below have no effect."""
+    """Whether the right-hand side is `dynamics(t) x + B u`; the `state` arguments below then have no effect."""
 
     is_time_invariant: ClassVar[bool] = False
-    """Whether `dynamics`, `transition` and `discretise` are the same at any time and state."""
+    """Whether `dynamics`, `transition` and `discretise` do not depend on time and state."""
 
     is_periodic: ClassVar[bool] = False
-    """Whether `dynamics` is the same after every `period`; a time-invariant model is."""
+    """Whether `dynamics` repeats after every `period`, as that of a time-invariant model does."""
 
     has_closed_form: ClassVar[bool] = False
-    """Whether `transition` is in closed form: a state far ahead then costs as much as the next one."""
+    """Whether `transition` is in closed form, at the same cost for any duration."""
 
     has_j2: ClassVar[bool] = False
-    """Whether the oblateness of the Earth is in the model, averaged or not."""
+    """Whether the model contains the oblateness of the Earth, averaged or not."""
 
     is_exact_under_j2: ClassVar[bool] = False
-    """Whether it is the motion of two satellites under point mass and J2 without approximation, so that
-    integrating both in the inertial frame gives the same."""
+    """Whether the motion is that of two satellites under point mass and J2 without approximation: the same as
+    from integrating both in the inertial frame."""
 
     @classmethod
     @abstractmethod
@@ -67,18 +68,18 @@ class RelativeModel(ABC):
         """The model about a chief with these osculating elements at time zero.
 
         Raises:
-            OrbitError: the model does not exist about this chief.
+            OrbitError: the model is not valid about this chief.
         """
 
     @property
     @abstractmethod
     def period(self) -> float:
-        """Time (s) in which the chief comes round to the same argument of latitude."""
+        """Period of the chief's argument of latitude, s."""
 
     @property
     @abstractmethod
     def longest_step(self) -> float:
-        """Longest step (s) over which the integration of this model is exact to rounding error."""
+        """Longest step of an integration to rounding error, s."""
 
     @abstractmethod
     def derivative(self, time: float, state: Array, acceleration: Array = NO_THRUST) -> Array:
@@ -89,7 +90,7 @@ class RelativeModel(ABC):
         """(6, 6) continuous matrix A(t): the Jacobian of `derivative` with respect to the state, there."""
 
     def motion(self, time: float, state: Array, acceleration: Array = NO_THRUST) -> tuple[Array, Array]:
-        """`derivative` (6,) and `dynamics` (6, 6) at one state, at once."""
+        """`derivative` (6,) and `dynamics` (6, 6) at one state."""
         return self.derivative(time, state, acceleration), self.dynamics(time, state)
 
     def transition(self, time: float, duration: float, state: Array = ON_THE_CHIEF) -> Array:
@@ -97,11 +98,13 @@ class RelativeModel(ABC):
         return self.discretise(time, duration, state)[0]
 
     def discretise(self, time: float, tick: float, state: Array = ON_THE_CHIEF) -> tuple[Array, Array]:
-        """Exact discrete model x(t + tick) = Phi x(t) + Gamma u under an acceleration u held over the tick.
+        """Exact discretisation x(t + tick) = Phi x(t) + Gamma u under an acceleration u held over the tick.
 
-        Held in the Hill frame, whose axes turn. Returns Phi (6, 6) and Gamma (6, 3). For a nonlinear model:
-        the derivatives of the state after the tick with respect to the state before it and to u, along the
-        free motion from `state`.
+        u is held in the Hill frame, which rotates. For a nonlinear model, Phi and Gamma are the derivatives of
+        the state after the tick with respect to the state before it and to u, along the free motion from `state`.
+
+        Returns:
+            Phi (6, 6) and Gamma (6, 3).
         """
         joint = np.zeros((6, 10))
         joint[:, 0] = state
@@ -130,13 +133,13 @@ class RelativeModel(ABC):
         )
 
     def bounded(self, time: float, state: Array) -> Array:
-        """(6,) state whose along-track rate is such that the free motion does not drift along the track.
+        """(6,) state with the along-track rate for which free motion does not drift along the track.
 
         Position and the other rates are those of `state`. The condition here is that the along-track position
-        after one period is what it was; a model with a better one states it.
+        repeats after one period; a model with a better one states it.
         """
         result = np.array(state, dtype=np.float64)
-        for _ in range(50):  # Newton; a linear model arrives in one step
+        for _ in range(50):  # Newton's method; one step for a linear model
             drift = self.propagate(time, result, self.period)[1] - result[1]
             change = -drift / self.transition(time, self.period, result)[1, 4]
             result[4] += change
@@ -176,9 +179,9 @@ class LinearModel(RelativeModel):
 def integrate(
     rate: Callable[[float, Array], Array], time: float, value: Array, duration: float, longest_step: float
 ) -> Array:
-    """Value after `duration` (either sign) of d(value)/dt = rate(t, value), in equal steps of order eight.
+    """Value after `duration` (of either sign) of d(value)/dt = rate(t, value), in equal steps of order eight.
 
-    Fixed steps: the same call gives the same bits, smooth in its arguments; step control would give neither.
+    Fixed steps make the result reproducible to the bit and smooth in the arguments; step control would not.
     """
     if duration == 0.0:
         return value

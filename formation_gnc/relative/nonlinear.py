@@ -43,14 +43,14 @@ class FactorisedModel(RelativeModel):
         """
 
     def derivative(self, time: float, state: Array, acceleration: Array = NO_THRUST) -> Array:
-        """(..., 6) right-hand side, by the factorisation SDC1, which cancels no digits."""
+        """(..., 6) right-hand side, by the factorisation SDC1, without cancellation."""
         free: Array = (self.factorised(state, self.chief.at(time)) @ np.asarray(state)[..., None])[..., 0]
         return free + np.asarray(acceleration) @ INPUT.T
 
 
 @dataclass(frozen=True)
 class NonlinearModel(FactorisedModel):
-    """Exact relative motion of two satellites of point-mass gravity, at any separation and eccentricity.
+    """Exact relative motion of two satellites under point-mass gravity, at any separation and eccentricity.
 
     Assumes: spherical Earth, a chief that does not manoeuvre. Source: Joshi (3.22)-(3.26) and (6.27)-(6.40),
     with the corrections of docs/theory/errata.md.
@@ -76,10 +76,10 @@ class NonlinearModel(FactorisedModel):
         return motion(state, acceleration, self.chief.at(time), oblate=False)
 
     def bounded(self, time: float, state: Array) -> Array:
-        """(6,) state whose along-track rate gives the deputy the chief's energy: both then take one period.
+        """(6,) state with the along-track rate for which deputy and chief have the same energy, and so period.
 
         Raises:
-            OrbitError: if the other rates alone already exceed that energy.
+            OrbitError: the other rates alone exceed that energy.
         """
         chief = self.chief.at(time)
         x, y, z, vx, _, vz = (float(value) for value in state)
@@ -97,7 +97,7 @@ class NonlinearModel(FactorisedModel):
 
 
 def jacobian(state: Array, chief: ChiefState) -> Array:
-    """(6, 6) Jacobian of the equations with point-mass gravity at a relative state (6,)."""
+    """(6, 6) Jacobian of the equations of motion under point-mass gravity, at a relative state (6,)."""
     place = np.array([chief.radius + state[0], state[1], state[2]])
     square = float(place @ place)
     matrix = frame_matrix(chief)

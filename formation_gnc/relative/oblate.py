@@ -1,4 +1,4 @@
-"""Differential J2 in the Hill frame: the nonlinear equations with Earth's oblateness."""
+"""The nonlinear equations of relative motion with differential J2."""
 
 import math
 from dataclasses import dataclass
@@ -21,8 +21,8 @@ from formation_gnc.relative.nonlinear import FactorisedModel, jacobian
 class OblateModel(FactorisedModel):
     """Relative motion of two satellites under point-mass gravity and J2.
 
-    Exact at any separation and eccentricity with an `OblateChief`. With a `KeplerChief` it is Joshi's model:
-    J2 acts on the difference of the two, while the chief keeps to its ellipse.
+    Exact at any separation and eccentricity with an `OblateChief`. With a `KeplerChief` it is Joshi's model: J2
+    acts on the difference of the two, while the chief stays on its ellipse.
 
     Assumes: no other force, a chief that does not manoeuvre. Source: Joshi (3.47), (3.48), with the
     corrections of docs/theory/errata.md.
@@ -39,7 +39,7 @@ class OblateModel(FactorisedModel):
         return cls(OblateChief(chief))
 
     def factorised(self, state: Array, chief: ChiefState, method: str = "sdc1") -> Array:
-        """(..., 6, 6) matrix A(x), with the differential J2 as a factorisation of its own."""
+        """(..., 6, 6) matrix A(x) of point-mass gravity, plus that of differential J2."""
         matrix = FACTORISATIONS[method](state, chief)
         matrix[..., 3:, :3] += oblateness(state, chief)
         return matrix
@@ -56,12 +56,11 @@ class OblateModel(FactorisedModel):
         return motion(state, acceleration, self.chief.at(time), oblate=True)
 
     def bounded(self, time: float, state: Array) -> Array:
-        """(6,) state whose along-track rate makes the mean latitudes, nodes included, keep their distance.
+        """(6,) state with the along-track rate for which the mean latitudes, nodes included, do not drift apart.
 
-        The condition is on mean elements, since J2 turns the perigee of the relative orbit too: to come
-        back to the same place after one revolution would be to drift. Good to first order in J2; about a
-        `KeplerChief`, where no motion with J2 is bounded, the along-track position comes back after one
-        revolution.
+        The condition is on mean elements: J2 also rotates the perigee of the relative orbit, so that a motion
+        which repeats after one revolution drifts. Valid to first order in J2. About a `KeplerChief`, where no
+        motion with J2 is bounded, the along-track position repeats after one revolution.
         """
         if not isinstance(self.chief, OblateChief):
             return super().bounded(time, state)
@@ -71,7 +70,7 @@ class OblateModel(FactorisedModel):
         transverse = hill_rate(inertial) * math.sqrt(inertial[:3] @ inertial[:3])
         slope = -3.0 * transverse / math.sqrt(MU * here.semi_major_axis)  # of n by vy: -3 n a v / mu
         result = np.array(state, dtype=np.float64)
-        for _ in range(50):  # the slope is that without J2: each round gains digits
+        for _ in range(50):  # Newton's method with the slope without J2
             deputy = elements_from_state(mean_state(inertial_from_relative(inertial, result)))
             node, *others = secular_rates(deputy)
             excess = sum(others) - sum(rates) + math.cos(here.inclination) * (node - node_rate)

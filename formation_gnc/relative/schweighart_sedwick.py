@@ -15,10 +15,10 @@ from formation_gnc.relative.model import ON_THE_CHIEF, Array, LinearModel
 
 @dataclass(frozen=True)
 class CircularReference:
-    """The circular orbit about which J2 is linearised; its rate and node move as J2 moves them on average.
+    """Circular reference orbit of the linearisation, with the mean rates of latitude and node under J2.
 
     Raises:
-        OrbitError: for a radius below the Earth's surface, or values that are not finite.
+        OrbitError: a radius below the Earth's surface, or a value that is not finite.
     """
 
     radius: float
@@ -29,7 +29,7 @@ class CircularReference:
     """Argument of latitude at time zero, rad."""
 
     def __post_init__(self) -> None:
-        """Reject what is no orbit."""
+        """Reject what is not an orbit."""
         for name, value in vars(self).items():
             if not math.isfinite(value):
                 raise OrbitError(f"{name} is {value}: it must be finite")
@@ -54,7 +54,7 @@ class CircularReference:
 
     @property
     def averaged(self) -> float:
-        """Roberts' s (13): the averaged J2 acceleration over the central one."""
+        """Averaged J2 acceleration over the central one: Roberts' s (13)."""
         return 0.375 * self.oblateness * (1.0 + 3.0 * math.cos(2.0 * self.inclination))
 
     @property
@@ -69,7 +69,7 @@ class CircularReference:
 
     @property
     def node_shear(self) -> float:
-        """Rate at which the nodes of planes of different inclination part, d(node rate)/di sin i, rad/s."""
+        """Differential nodal rate of planes of different inclination, d(node rate)/di sin i, rad/s."""
         return 1.5 * self.mean_motion * self.oblateness * math.sin(self.inclination) ** 2
 
     def latitude_at(self, time: float) -> float:
@@ -82,8 +82,8 @@ class SchweighartSedwickModel(HarmonicModel):
     """Linear relative motion of two satellites under J2, with the gradient of J2 averaged over an orbit.
 
     Time-invariant and of Hill's form: Roberts (24). Assumes: near-circular orbits, curvilinear coordinates,
-    separations much smaller than the radius; what J2 does within an orbit is left out, and planes of
-    different inclination turn about the wrong axis (see `SchweighartSedwickNodalModel`).
+    separations much smaller than the radius. Neglects the variation of J2 within an orbit, and lets planes of
+    different inclination precess about the wrong axis (see `SchweighartSedwickNodalModel`).
     """
 
     has_j2 = True
@@ -97,14 +97,14 @@ class SchweighartSedwickModel(HarmonicModel):
 
     @property
     def frequencies(self) -> tuple[float, float, float]:
-        """Frame's rate n c, in-plane frequency n sqrt(1 - s), cross-track frequency n sqrt(1 + 3 s)."""
+        """Frame's rate n c, in-plane frequency n sqrt(1 - s), cross-track frequency n sqrt(1 + 3 s), rad/s."""
         n, s = self.reference.mean_motion, self.reference.averaged
         return self.reference.rate, n * math.sqrt(1.0 - s), n * math.sqrt(1.0 + 3.0 * s)
 
     def centred(self, time: float, state: Array) -> Array:
         """(..., 6) state with the radial and along-track rates of Roberts (32), (33): no drift, no offset.
 
-        The deputy then circles the chief; `bounded` keeps the radial rate, and an offset with it.
+        The deputy then circles the chief; `bounded` keeps the radial rate, and with it an offset.
         """
         w, q, _ = self.frequencies
         result = self.bounded(time, state)
@@ -112,10 +112,10 @@ class SchweighartSedwickModel(HarmonicModel):
         return result
 
     def on_the_equator(self, state: Array) -> Array:
-        """(..., 6) state relative to the reference orbit of one perturbed satellite that crosses the equator.
+        """(..., 6) state of one perturbed satellite relative to the reference orbit, at an equator crossing.
 
-        Without drift and offset over the orbits that follow: Roberts (28)-(30). Both satellites of a
-        formation start so, each about the same reference.
+        Without drift and offset over the following orbits: Roberts (28)-(30). Both satellites of a formation
+        start so, each about the same reference.
         """
         reference = self.reference
         result = self.centred(0.0, state)
@@ -126,13 +126,13 @@ class SchweighartSedwickModel(HarmonicModel):
 
 @dataclass(frozen=True)
 class SchweighartSedwickNodalModel(LinearModel):
-    """The averaged model with the cross-track motion that the drift of the two nodes gives it.
+    """The averaged model with the cross-track motion due to differential nodal precession.
 
-    In-plane as `SchweighartSedwickModel`. Across the track the two orbit planes intersect at small angles:
-    z is r (di sin u - dO cos u), u = k t, where the difference of the nodes dO (times sin i) grows at the
-    constant rate `node_shear` times the difference of inclination di. This is Roberts (25), z'' + q^2 z = 2
-    l q cos(q t + phi), to first order in the separation, where its q, l and phi, which are functions of the
-    initial state and undefined for a zero one, become a linear time-varying equation without singularity.
+    In-plane as `SchweighartSedwickModel`. Cross-track, the two orbit planes intersect at small angles:
+    z = r (di sin u - dO cos u), u = k t, where the difference of the nodes dO (times sin i) grows at the constant
+    rate `node_shear` times the difference of inclination di. This is Roberts (25), z'' + q^2 z = 2 l q
+    cos(q t + phi), to first order in the separation, as a linear time-varying equation without singularity; his
+    q, l and phi are functions of the initial state and undefined for a zero one.
     """
 
     is_periodic = True
@@ -153,12 +153,12 @@ class SchweighartSedwickNodalModel(LinearModel):
 
     @property
     def longest_step(self) -> float:
-        """A hundredth of the period, s."""
+        """A hundredth of the nodal period, s."""
         return 0.01 * self.period
 
     @property
     def in_plane(self) -> SchweighartSedwickModel:
-        """The model that holds in the plane."""
+        """Model of the in-plane motion."""
         return SchweighartSedwickModel(self.reference)
 
     def phase_rates(self, time: float) -> tuple[float, float]:
@@ -189,7 +189,7 @@ class SchweighartSedwickNodalModel(LinearModel):
         return self.transition(time, tick), gamma
 
     def bounded(self, time: float, state: Array) -> Array:
-        """(..., 6) state without drift along the track; the cross-track motion is left alone."""
+        """(..., 6) state without along-track drift; the cross-track motion is unchanged."""
         return self.in_plane.bounded(time, state)
 
     def _planes(self, time: float) -> tuple[Array, Array]:

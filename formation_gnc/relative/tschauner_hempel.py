@@ -14,10 +14,10 @@ from formation_gnc.relative.nonlinear import jacobian
 
 @dataclass(frozen=True)
 class TschaunerHempelModel(LinearModel):
-    """Linear relative motion about a chief on an ellipse of point-mass gravity.
+    """Linear relative motion about a chief on an ellipse, under point-mass gravity.
 
     Exact in the chief's eccentricity, below one. Assumes: spherical Earth, separation much smaller than the
-    radius. Source: Kremmydas section 1.1.4 names the model (its equations are misprinted: errata.md); the
+    radius. Source: Kremmydas section 1.1.4 for the model (equations misprinted: docs/theory/errata.md); the
     transition matrix is Yamanaka and Ankersen's (2002), in the axes used here.
     """
 
@@ -42,7 +42,7 @@ class TschaunerHempelModel(LinearModel):
         return self.chief.longest_step
 
     def phase_rates(self, time: float) -> tuple[float, float]:
-        """Rate of the chief's true anomaly, rad/s, for both."""
+        """Rate of the chief's true anomaly for both, rad/s."""
         rate = self.chief.at(time).angular_rate
         return rate, rate
 
@@ -63,7 +63,8 @@ class TschaunerHempelModel(LinearModel):
         return self.transition(time, tick), gamma
 
     def bounded(self, time: float, state: Array) -> Array:
-        """(..., 6) state whose along-track rate leaves no secular term: equal energies, to first order."""
+        """(..., 6) state with the along-track rate for which there is no secular term: equal energies, to first
+        order."""
         result = np.array(state, dtype=np.float64)
         start = _Instant(self.chief, time)
         secular = (start.constants() @ start.to_anomaly())[3]

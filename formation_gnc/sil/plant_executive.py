@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from formation_gnc.flight.barrier import Decision
-from formation_gnc.plant.plant import PlantParameters
+from formation_gnc.plant.parameters import PlantParameters
 from formation_gnc.records import Thrust
 from formation_gnc.sil.simulation import Simulation, Sink
 

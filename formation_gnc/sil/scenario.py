@@ -15,7 +15,7 @@ from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight.graph import GRAPH
 from formation_gnc.guidance.fleet_checks import check_fleet
 from formation_gnc.parameters import dump, load, read_yaml
-from formation_gnc.plant.plant import PlantParameters
+from formation_gnc.plant.parameters import PlantParameters
 
 SECTION = "ros__parameters"
 

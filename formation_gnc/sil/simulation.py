@@ -7,7 +7,8 @@ from typing import Any
 from formation_gnc.flight import topics
 from formation_gnc.flight.barrier import Decision, TickBarrier
 from formation_gnc.flight.graph import GRAPH
-from formation_gnc.plant.plant import Plant, PlantParameters
+from formation_gnc.plant.parameters import PlantParameters
+from formation_gnc.plant.plant import Plant
 from formation_gnc.records import Clock, Event, EventKind, Thrust
 from formation_gnc.types import NANOSECONDS
 

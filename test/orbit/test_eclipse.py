@@ -1,4 +1,4 @@
-"""When the shadow is met, against geometry and against the plant's own rule."""
+"""Eclipse forecast against geometry and against the propagated illumination."""
 
 import math
 
@@ -28,25 +28,25 @@ def test_eclipse_in_the_suns_plane_lasts_as_a_cylindrical_shadow_says(revolution
     nights = eclipses(circular(0.4, 0.0), 3.0 * revolution, revolution / 180.0, EQUINOX)
     assert len(nights) == 3
     expected = revolution * math.asin(EARTH_RADIUS / RADIUS) / math.pi
-    # a node on the Sun's line: the Sun's disc of half a degree adds that much of the orbit
+    # The node is on the Sun's line; the penumbra adds the Sun's half degree of the orbit.
     assert np.diff(nights)[:, 0] == pytest.approx(expected, abs=revolution * math.radians(0.6) / math.tau)
     middle = nights.mean(axis=1)
     assert middle[0] == pytest.approx(0.5 * revolution, rel=0.01)  # opposite the Sun
-    assert np.diff(middle) == pytest.approx(revolution, rel=3e-3)  # J2: the nodes come round faster
+    assert np.diff(middle) == pytest.approx(revolution, rel=3e-3)  # J2: the nodal period is shorter
 
 
-def test_a_plane_that_faces_the_sun_has_no_night(revolution: float) -> None:
+def test_orbit_facing_the_sun_has_no_eclipse(revolution: float) -> None:
     facing = circular(math.pi / 2.0, 0.0, math.pi / 2.0)
     assert not len(eclipses(facing, revolution, revolution / 180.0, EQUINOX))
 
 
-def test_begin_and_end_are_where_the_plant_sees_them(revolution: float) -> None:
+def test_begin_and_end_are_those_of_the_propagated_illumination(revolution: float) -> None:
     state, tick = circular(1.7104, 1.0), 1.0
     nights = eclipses(state, 1.2 * revolution, revolution / 180.0, EQUINOX)
-    propagator, flown, dark = Propagator(tick, epoch=EQUINOX), state, []
+    propagator, now, dark = Propagator(tick, epoch=EQUINOX), state, []
     for k in range(int(1.2 * revolution)):
-        dark.append(propagator.illumination(k * tick, flown) < 1.0)
-        flown = propagator.propagate(k * tick, flown[None], np.zeros((1, 3)))[0]
+        dark.append(propagator.illumination(k * tick, now) < 1.0)
+        now = propagator.propagate(k * tick, now[None], np.zeros((1, 3)))[0]
     changes = 1.0 + np.flatnonzero(np.diff(dark))
     bounds = nights.ravel()[(nights.ravel() > 0.0) & (nights.ravel() < len(dark) - 1)]
     assert len(changes) == len(bounds) >= 2
@@ -60,6 +60,6 @@ def test_eclipses_are_clipped_to_the_forecast_window(
     assert eclipses(inside, 600.0, 30.0, EQUINOX) == pytest.approx(np.array([[0.0, 600.0]]))
 
 
-def test_an_orbit_that_meets_the_earth_is_rejected() -> None:
+def test_orbit_that_meets_the_earth_raises_impact_error() -> None:
     with pytest.raises(ImpactError):
         eclipses(np.zeros(6), 600.0, 30.0)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import OrbitError
 from formation_gnc.orbit.constants import MU
 from formation_gnc.orbit.elements import (
     Elements,
@@ -37,7 +37,7 @@ def orbits(draw):
 @example(Elements(7e6, 0.0, pi, 1.0, 2.0, 3.0))
 @example(Elements(8e6, 0.1, pi, 1.0, 2.0, 3.0))
 @example(Elements(7e6, 0.0, 1.0, 1.0, 2.0, 3.0))
-def test_state_survives_the_round_trip_through_elements(elements):
+def test_state_to_elements_and_back_is_the_same_state(elements):
     state = state_from_elements(elements)
     again = state_from_elements(elements_from_state(state))
     # Rounding, plus at most SINGULAR of a direction taken by convention, amplified by 1/(1-e) at high e.
@@ -47,13 +47,13 @@ def test_state_survives_the_round_trip_through_elements(elements):
 
 
 @given(st.floats(0.001, 0.9), st.floats(0.01, pi - 0.01), ANGLE, ANGLE, ANGLE)
-def test_elements_survive_the_round_trip_through_a_state(eccentricity, inclination, node, perigee, anomaly):
+def test_elements_to_state_and_back_are_the_same_elements(eccentricity, inclination, node, perigee, anomaly):
     elements = Elements(7e6 / (1 - eccentricity), eccentricity, inclination, node, perigee, anomaly)
     again = elements_from_state(state_from_elements(elements))
     assert again.semi_major_axis == pytest.approx(elements.semi_major_axis, rel=1e-13 / (1 - eccentricity))
     assert again.eccentricity == pytest.approx(eccentricity, abs=1e-14)
     assert again.inclination == pytest.approx(inclination, abs=1e-13)
-    # An angle is only as sharp as its lever arm: 1/sin i for the node, 1/e for perigee.
+    # The error of an angle is inverse to its lever arm: sin i for the node, e for perigee.
     for name, lever in (("right_ascension", 0.01), ("argument_of_perigee", 1e-3), ("true_anomaly", 1e-3)):
         difference = getattr(again, name) - getattr(elements, name)
         assert abs(np.sin(difference / 2)) < 2e-15 / lever
@@ -88,7 +88,7 @@ def test_singular_orbits_follow_the_convention(state, expected):
 def test_vallado_example_of_state_to_elements():
     """Vallado, Fundamentals of Astrodynamics, example 2-5 (his gravity, his digits).
 
-    His perigee lies below the surface, so the orbit is flown ten times larger about a 1000 times heavier one.
+    His perigee is below the surface: orbit ten times larger, gravitational parameter a thousand times.
     """
     state = np.array([6524.834, 6862.875, 6448.296, 4.901327, 5.533756, -1.976341]) * 1e4
     found = elements_from_state(state, mu=3.986004418e17)
@@ -104,7 +104,7 @@ def test_vallado_example_of_state_to_elements():
 @example(0.0, 1 - 1e-12)
 @example(1e-9, 1 - 1e-12)
 @example(pi, 0.999)
-def test_kepler_equation_is_solved_to_rounding(mean_anomaly, eccentricity):
+def test_kepler_equation_is_solved_to_rounding_error(mean_anomaly, eccentricity):
     anomaly = eccentric_anomaly(mean_anomaly, eccentricity)
     residual = anomaly - eccentricity * np.sin(anomaly) - mean_anomaly
     assert abs(residual) < 4e-16 * max(1.0, abs(mean_anomaly)) * 4
@@ -137,7 +137,7 @@ def test_elements_that_cannot_be_flown_are_rejected(change, message):
         "argument_of_perigee": 0.0,
         "true_anomaly": 0.0,
     }
-    with pytest.raises(ConfigurationError, match=message):
+    with pytest.raises(OrbitError, match=message):
         Elements(**values | change)
 
 
@@ -152,6 +152,6 @@ def test_elements_that_cannot_be_flown_are_rejected(change, message):
         ([7e6, 0, 0], "six finite"),
     ],
 )
-def test_states_that_are_no_orbit_are_rejected(state, message):
-    with pytest.raises(ConfigurationError, match=message):
+def test_states_without_a_closed_orbit_are_rejected(state, message):
+    with pytest.raises(OrbitError, match=message):
         elements_from_state(np.array(state, dtype=float))

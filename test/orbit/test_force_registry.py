@@ -1,4 +1,4 @@
-"""A force is one file and one line of the registry."""
+"""Registry of forces, and the acceleration at a state."""
 
 import json
 import os
@@ -19,13 +19,14 @@ from formation_gnc.orbit.gravity import acceleration as point_mass_with_j2
 from formation_gnc.orbit.propagation import Propagator
 from formation_gnc.orbit.sky import earth_rotation_angle, moon, sun
 from formation_gnc.parameters import load
-from formation_gnc.plant.plant import Plant, PlantParameters
+from formation_gnc.plant.parameters import PlantParameters
+from formation_gnc.plant.plant import Plant
 
 ELEMENTS = Elements(6.8e6, 0.01, 0.9, 0.3, 0.4, 0.5)
 EPOCH = 7.9e8
 ALL = Forces(harmonics_degree=8, sun=True, moon=True, radiation_pressure=True, drag=True)
 
-# The one file ...
+# One file.
 ALONG_TRACK = '''
 """Constant acceleration along the velocity."""
 
@@ -46,19 +47,19 @@ def acceleration(settings: Floats, coefficient: float, ephemerides: Floats, stat
 ALONG_TRACK = Force({"along_track": parameter(0.0, unit="m/s^2", doc="along the velocity")}, acceleration)
 '''
 
-# ... the one line, and a flight of the plant with and without it.
+# One line, then a run of the plant without and with the force.
 FLIGHTS = """
 import json
 from formation_gnc.orbit.forces import registry
 from along_track import ALONG_TRACK
 registry.FORCES.append(ALONG_TRACK)
 
-from test_force_registry import fly
-print(json.dumps([fly(), fly({"forces.along_track": 1e-4})]))
+from test_force_registry import run_plant
+print(json.dumps([run_plant(), run_plant({"forces.along_track": 1e-4})]))
 """
 
 
-def fly(values: dict[str, Any] | None = None) -> list[float]:
+def run_plant(values: dict[str, Any] | None = None) -> list[float]:
     """Inertial state of the chief after ten minutes without thrust."""
     given = {
         "chief.semi_major_axis": 7e6,
@@ -74,16 +75,16 @@ def fly(values: dict[str, Any] | None = None) -> list[float]:
     return plant.truth().chief_state.tolist()
 
 
-def test_a_new_force_is_one_file_and_one_line_and_flies(tmp_path):
+def test_new_force_is_one_file_and_one_line(tmp_path):
     (tmp_path / "along_track.py").write_text(ALONG_TRACK)
     (tmp_path / "flights.py").write_text(FLIGHTS)
     path = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
     run = [sys.executable, str(tmp_path / "flights.py")]
     output = subprocess.run(run, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, check=True)
     off, on = json.loads(output.stdout)
-    assert off == fly()  # to the bit: a force that is off adds nothing
+    assert off == run_plant()  # to the bit
     axes = [1.0 / (2.0 / np.linalg.norm(s[:3]) - np.dot(s[3:], s[3:]) / MU) for s in (off, on)]
-    # da/dt = 2 f / n on a circular orbit; n changes by 2e-5 as it rises by 110 m.
+    # da/dt = 2 f / n on a circular orbit; n changes by 2e-5 over the rise of 110 m.
     assert axes[1] - axes[0] == pytest.approx(2.0 * 1e-4 * 600.0 / np.sqrt(MU / 7e6**3), rel=1e-4)
 
 
@@ -110,7 +111,7 @@ def test_acceleration_is_the_sum_of_the_forces_over_the_mass():
     assert together[0] - together[1] == pytest.approx(0.5 * surface, abs=1e-14)
 
 
-def test_acceleration_is_the_rate_of_change_of_the_propagated_velocity():
+def test_acceleration_is_the_derivative_of_the_propagated_velocity():
     states, body = state_from_elements(ELEMENTS)[None], Body()
     propagator = Propagator(1.0, 1, ALL, [body], EPOCH)
     after = propagator.propagate(0.0, states, np.zeros((1, 3)))
@@ -121,7 +122,7 @@ def test_acceleration_is_the_rate_of_change_of_the_propagated_velocity():
     assert change == pytest.approx((begin + 4.0 * half + end)[0] / 6.0, abs=5e-12)
 
 
-def test_two_forces_with_one_parameter_name_are_rejected(tmp_path):
+def test_forces_with_the_same_parameter_name_are_rejected(tmp_path):
     script = """
 from formation_gnc.orbit.forces import registry
 registry.FORCES.append(registry.FORCES[0])

@@ -1,4 +1,4 @@
-"""Each force against its own physics: potentials, geometry, published rates."""
+"""Forces against potentials, geometry and published rates."""
 
 from math import pi, radians, tau
 
@@ -62,7 +62,7 @@ def test_zonal_acceleration_is_the_gradient_of_its_potential(degree, radius, sin
     assert np.abs(ours - numerical_gradient(zonal_potential(degree), position)).max() < 2e-14 * scale
 
 
-def test_central_attraction_is_newtons():
+def test_central_attraction_is_inverse_square():
     position = point(7e6, 0.3, 1.0)
     expected = -MU * position / 7e6**3
     assert np.array(zonal.acceleration(0, *position)) == pytest.approx(expected, rel=1e-15)
@@ -70,7 +70,7 @@ def test_central_attraction_is_newtons():
 
 @COMPILES
 @given(RADIUS, SINE, LONGITUDE)
-def test_zonal_recursion_meets_the_closed_form_of_j2(radius, sine, longitude):
+def test_zonal_recursion_equals_the_closed_form_of_j2(radius, sine, longitude):
     """Degree 2 has its own fast form; with J3 to J6 taken off, the recursion must give the same."""
     position = point(radius, sine, longitude)
     recursion = np.array(zonal.acceleration(3, *position)) - (
@@ -129,7 +129,7 @@ def test_harmonic_acceleration_is_the_gradient_of_its_potential(degree, place):
 
 @COMPILES
 @given(RADIUS, SINE, LONGITUDE, LONGITUDE)
-def test_harmonics_turn_with_the_earth(radius, sine, longitude, turn):
+def test_harmonics_rotate_with_the_earth(radius, sine, longitude, turn):
     fixed = np.array(harmonics.acceleration(8, 1.0, 0.0, *point(radius, sine, longitude)))
     turned = np.array(harmonics.acceleration(8, np.cos(turn), np.sin(turn), *point(radius, sine, longitude + turn)))
     rotation = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
@@ -143,7 +143,7 @@ def test_harmonics_are_finite_and_symmetric_at_the_pole():
     assert pole == pytest.approx(beside, abs=1e-8)
 
 
-def test_tides_of_moon_and_sun_have_their_textbook_size():
+def test_tidal_accelerations_have_their_textbook_size():
     """At GEO, towards the body: 2 mu r / d^3, about 7e-6 m/s^2 for the Moon and 3e-6 for the Sun."""
     for mu, body, size in ((third_body.MU_MOON, moon(0.0), 7.3e-6), (third_body.MU_SUN, sun(0.0), 3.3e-6)):
         distance = np.linalg.norm(body)
@@ -161,7 +161,7 @@ def test_third_body_vanishes_at_the_earths_centre():
     assert np.array(third_body.acceleration(third_body.MU_MOON, *moon(0.0), 0.0, 0.0, 0.0)) == pytest.approx(0.0)
 
 
-def fly(elements, duration, tick, forces, body=None, epoch=0.0, substeps=1):
+def propagated(elements, duration, tick, forces, body=None, epoch=0.0, substeps=1):
     propagator = Propagator(tick, substeps, forces, (body or Body(),), epoch)
     states, thrust = state_from_elements(elements)[None], np.zeros((1, 3))
     for k in range(round(duration / tick)):
@@ -169,12 +169,12 @@ def fly(elements, duration, tick, forces, body=None, epoch=0.0, substeps=1):
     return states[0]
 
 
-def test_sun_and_moon_tilt_a_geostationary_orbit_by_its_known_rate():
+def test_sun_and_moon_incline_a_geostationary_orbit_at_the_known_rate():
     """0.75 to 0.95 deg a year, over the Moon's 18.6-year cycle; the yearly mean of 2006 is near the top."""
     start = Elements(42164e3, 0.0, 0.0, 0.0, 0.0, 0.0)
-    end = fly(start, 365 * DAY, 600.0, Forces(sun=True, moon=True), epoch=6 * 365.25 * DAY)
+    end = propagated(start, 365 * DAY, 600.0, Forces(sun=True, moon=True), epoch=6 * 365.25 * DAY)
     assert np.degrees(elements_from_state(end).inclination) == pytest.approx(0.90, abs=0.06)
-    alone = fly(start, 365 * DAY, 600.0, Forces(sun=True), epoch=6 * 365.25 * DAY)
+    alone = propagated(start, 365 * DAY, 600.0, Forces(sun=True), epoch=6 * 365.25 * DAY)
     # The Sun's own share is 0.27 deg a year (Soop, Handbook of Geostationary Orbits, section 4.2).
     assert np.degrees(elements_from_state(alone).inclination) == pytest.approx(0.27, abs=0.02)
 
@@ -183,7 +183,7 @@ def test_nodal_drift_of_a_sun_synchronous_orbit():
     """800 km and 98.6 deg give 360 deg a year, for mean elements; these osculate 9 km (0.44 %) below."""
     start = Elements(EARTH_RADIUS + 800e3, 0.0012, radians(98.603), 0.0, pi / 2, 0.0)
     period = start.period
-    end = fly(start, 100 * period, period / 300, Forces(zonal_degree=6))
+    end = propagated(start, 100 * period, period / 300, Forces(zonal_degree=6))
     drift = elements_from_state(end).right_ascension / (100 * period) * DAY * 365.2422
     assert np.degrees(drift) == pytest.approx(360.0, rel=0.01)
 
@@ -194,11 +194,11 @@ class TestShadow:
     def light(self, x, y, z=0.0):
         return radiation.illumination(*self.sun, x, y, z)
 
-    def test_noon_is_bright_and_midnight_dark(self):
+    def test_noon_is_sunlit_and_midnight_dark(self):
         assert self.light(7e6, 0.0) == 1.0
         assert self.light(-7e6, 0.0) == 0.0
 
-    def test_umbra_ends_in_a_cone_of_the_right_length(self):
+    def test_umbra_is_a_cone_of_the_right_length(self):
         """R d / (R_sun - R): 1.384 million km behind the Earth; beyond it the eclipse is annular."""
         length = EARTH_RADIUS * ASTRONOMICAL_UNIT / (radiation.SUN_RADIUS - EARTH_RADIUS)
         assert length == pytest.approx(1.384e9, rel=1e-3)
@@ -208,7 +208,7 @@ class TestShadow:
 
     @COMPILES
     @given(st.floats(6.5e6, 5e7), st.floats(0.9, 1.1))
-    def test_penumbra_is_the_area_of_the_disc_that_is_not_covered(self, behind, offset):
+    def test_penumbra_is_the_uncovered_area_of_the_disc(self, behind, offset):
         """Counted on a grid over the Sun's disc, seen flat."""
         y = EARTH_RADIUS * offset
         position = np.array([-behind, y, 0.0])
@@ -223,7 +223,7 @@ class TestShadow:
         # A grid of 401 points resolves an area to its edge, about 1 / 200 of it.
         assert self.light(*position) == pytest.approx(1 - covered.sum() / disc.sum(), abs=6e-3)
 
-    def test_light_fades_steadily_from_full_to_none(self):
+    def test_illumination_decreases_monotonically_through_penumbra(self):
         light = [self.light(-7e6, y) for y in np.linspace(EARTH_RADIUS * 1.02, EARTH_RADIUS * 0.98, 2001)]
         assert light[0] == 1.0
         assert light[-1] == 0.0
@@ -241,7 +241,7 @@ class TestShadow:
         assert minutes == pytest.approx(71.5, abs=1.0)
 
 
-def test_sunlight_pushes_away_from_the_sun_with_the_solar_constant():
+def test_radiation_pressure_is_the_solar_constant_over_c():
     ahead = np.array([ASTRONOMICAL_UNIT, 0.0, 0.0])
     push = np.array(radiation.acceleration(0.02, *ahead, 0.0, 0.0, 7e6))
     assert push[0] == pytest.approx(-0.02 * 1361.0 / 299792458.0, rel=1e-6)
@@ -250,7 +250,7 @@ def test_sunlight_pushes_away_from_the_sun_with_the_solar_constant():
     assert push[0] / double[0] == pytest.approx(4.0, rel=1e-6)
 
 
-def test_atmosphere_thins_out_without_jumps():
+def test_density_decreases_without_jumps():
     heights = np.linspace(100e3, 1500e3, 5000)
     air = np.array([drag.density(EARTH_RADIUS + h, 0.0, 0.0) for h in heights])
     assert np.all(np.diff(air) < 0.0)
@@ -261,25 +261,25 @@ def test_atmosphere_thins_out_without_jumps():
     assert drag.density(EARTH_RADIUS + 747.2119e3, 0.0, 0.0) == pytest.approx(2.1219854e-14, rel=1e-7)  # Vallado 8-4
 
 
-def test_air_is_denser_over_the_equator_than_over_the_pole_at_one_radius():
+def test_density_at_equal_radius_is_higher_over_the_equator():
     equator, pole = drag.density(6.778e6, 0.0, 0.0), drag.density(0.0, 0.0, 6.778e6)
     assert equator / pole == pytest.approx(np.exp(21.38e3 / 58.0e3), rel=0.05)
 
 
-def test_drag_brakes_a_circular_orbit_at_the_analytic_rate():
+def test_drag_decays_a_circular_orbit_at_the_analytic_rate():
     """da/dt = -rho (C A / m) sqrt(mu a) (1 - w cos(i) / n)^2, over one equatorial orbit."""
     start = Elements(EARTH_RADIUS + 400e3, 0.0, 0.0, 0.0, 0.0, 0.0)
     body = Body(mass=50.0, area=2.0, drag_coefficient=2.2)
     period = start.period
-    end = fly(start, period, period / 500, Forces(zonal_degree=0, drag=True), body)
+    end = propagated(start, period, period / 500, Forces(zonal_degree=0, drag=True), body)
     change = elements_from_state(end).semi_major_axis - start.semi_major_axis
     rho = 3.725e-12
     wind = (1 - EARTH_ROTATION_RATE / start.mean_motion) ** 2
     expected = -rho * 2.2 * 2.0 / 50.0 * np.sqrt(MU * start.semi_major_axis) * wind * period
-    assert change == pytest.approx(expected, rel=5e-3)  # the orbit sinks by 9 m of a scale height of 58 km
+    assert change == pytest.approx(expected, rel=5e-3)  # decay of 9 m, with a scale height of 58 km
 
 
-def test_present_masses_take_the_place_of_the_bodies():
+def test_present_masses_override_those_of_the_bodies():
     start = state_from_elements(Elements(EARTH_RADIUS + 300e3, 0.0, 0.0, 0.0, 0.0, 0.0))[None]
     forces, thrust = Forces(drag=True), np.zeros((1, 3))
     light = Propagator(10.0, 1, forces, (Body(mass=50.0),)).propagate(0.0, start, thrust)
@@ -289,19 +289,19 @@ def test_present_masses_take_the_place_of_the_bodies():
 
 
 @pytest.mark.parametrize("switch", ["sun", "moon", "radiation_pressure", "drag"])
-def test_every_switch_matters_and_none_is_on_by_default(switch):
+def test_every_force_acts_and_none_is_on_by_default(switch):
     start = Elements(EARTH_RADIUS + 400e3, 0.0, 0.5, 0.0, 0.0, 0.0)
-    plain = fly(start, 100.0, 10.0, Forces())
-    assert not np.array_equal(plain, fly(start, 100.0, 10.0, Forces(**{switch: True})))
+    plain = propagated(start, 100.0, 10.0, Forces())
+    assert not np.array_equal(plain, propagated(start, 100.0, 10.0, Forces(**{switch: True})))
 
 
-def test_order_of_the_method_survives_forces_that_depend_on_time():
+def test_order_of_the_method_holds_with_time_dependent_forces():
     """Moon, Sun and a turning field in one step of 2 s against steps of 60 s and 120 s."""
     forces = Forces(harmonics_degree=8, sun=True, moon=True)
     start = Elements(7.5e6, 0.05, 1.0, 0.0, 0.0, 0.0)
-    truth = fly(start, 4800.0, 10.0, forces, epoch=7e8)
-    coarse = np.linalg.norm(fly(start, 4800.0, 120.0, forces, epoch=7e8) - truth)
-    fine = np.linalg.norm(fly(start, 4800.0, 60.0, forces, epoch=7e8) - truth)
+    truth = propagated(start, 4800.0, 10.0, forces, epoch=7e8)
+    coarse = np.linalg.norm(propagated(start, 4800.0, 120.0, forces, epoch=7e8) - truth)
+    fine = np.linalg.norm(propagated(start, 4800.0, 60.0, forces, epoch=7e8) - truth)
     assert fine > 1e-5
     assert 7.0 < np.log2(coarse / fine) < 10.0
 
@@ -314,7 +314,7 @@ def test_order_of_the_method_survives_forces_that_depend_on_time():
         ({"sun": 2}, "sun"),
     ],
 )
-def test_forces_that_do_not_exist_are_rejected(bad, message):
+def test_settings_out_of_range_are_rejected(bad, message):
     with pytest.raises(ConfigurationError, match=message):
         Propagator(1.0, forces=Forces(**bad))
 
@@ -328,19 +328,19 @@ def test_forces_that_do_not_exist_are_rejected(bad, message):
         ({"reflectivity": 3.0}, "refl"),
     ],
 )
-def test_bodies_that_do_not_exist_are_rejected(bad, message):
+def test_bodies_out_of_range_are_rejected(bad, message):
     with pytest.raises(ConfigurationError, match=message):
         Propagator(1.0, bodies=(Body(**bad),))
 
 
-def test_a_force_without_its_body_is_rejected():
+def test_surface_forces_need_a_body_for_each_satellite():
     with pytest.raises(ConfigurationError, match="bodies is empty"):
         Propagator(1.0, forces=Forces(drag=True))
     with pytest.raises(ConfigurationError, match="2 bodies for 1 satellites"):
         Propagator(1.0, bodies=(Body(), Body())).propagate(0.0, np.ones((1, 6)), np.zeros((1, 3)))
 
 
-def test_an_impact_is_reported_not_flown():
+def test_impact_raises_impact_error():
     state = np.array([[EARTH_RADIUS + 1e3, 0.0, 0.0, -500.0, 7000.0, 0.0]])
     with pytest.raises(ImpactError, match="satellite 0 is below the Earth's surface at 10 s"):
         Propagator(10.0).propagate(0.0, state, np.zeros((1, 3)))

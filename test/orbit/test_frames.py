@@ -1,4 +1,4 @@
-"""The Hill frame: exactness, inverses, and what a frame that turns sees."""
+"""Hill frame: exactness, inverses, and velocities in a rotating frame."""
 
 from math import pi
 
@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import OrbitError
 from formation_gnc.orbit.constants import MU
 from formation_gnc.orbit.elements import Elements, state_from_elements, true_from_mean_anomaly
 from formation_gnc.orbit.frames import (
@@ -37,7 +37,7 @@ RELATIVE = st.tuples(*[st.floats(-1e5, 1e5)] * 3, *[st.floats(-100, 100)] * 3).m
 
 
 @given(chiefs(), RELATIVE)
-def test_relative_state_survives_the_round_trip(chief, relative):
+def test_relative_state_to_inertial_and_back_is_the_same_state(chief, relative):
     again = relative_from_inertial(chief, inertial_from_relative(chief, relative))
     # A few parts in 1e16 of the orbit's radius, up to 4e7 m, and speed.
     assert np.abs(again - relative)[:3].max() < 5e-8
@@ -45,7 +45,7 @@ def test_relative_state_survives_the_round_trip(chief, relative):
 
 
 @given(chiefs(), RELATIVE)
-def test_transform_is_the_linear_form_of_the_exact_map(chief, relative):
+def test_transform_matrix_equals_the_exact_map(chief, relative):
     deputy = inertial_from_relative(chief, relative)
     assert hill_transform(chief) @ (deputy - chief) == pytest.approx(relative_from_inertial(chief, deputy), abs=1e-7)
     assert hill_transform(chief) @ hill_transform_inverse(chief) == pytest.approx(np.eye(6), abs=1e-14)
@@ -82,14 +82,14 @@ def test_relative_velocity_is_the_derivative_of_relative_position():
     assert derivative == pytest.approx(relative(0.0)[3:], abs=1e-5)
 
 
-def test_under_j2_the_derivative_differs_by_the_tilt_of_the_orbit_plane():
-    """The documented convention, shown by finite differences on the propagated truth."""
+def test_under_j2_the_derivative_differs_by_the_orbit_planes_tilt():
+    """The documented convention, by finite differences of propagated orbits."""
     relative = np.array([300.0, -500.0, 400.0, 0.1, -0.2, 0.3])
     states = np.array([CHIEF, inertial_from_relative(CHIEF, relative)])
     step = 0.5
     after = Propagator(step).propagate(0.0, states, np.zeros((2, 3)))
     before = Propagator(step).propagate(0.0, states * [1, 1, 1, -1, -1, -1], np.zeros((2, 3)))
-    before = before * [1, 1, 1, -1, -1, -1]  # time reversed: gravity is the same both ways
+    before = before * [1, 1, 1, -1, -1, -1]  # gravity is symmetric under time reversal
     derivative = (relative_from_inertial(*after)[:3] - relative_from_inertial(*before)[:3]) / (2 * step)
     tilt = hill_angular_velocity(CHIEF, acceleration(CHIEF[:3])) * [1, 0, 0]
     expected = relative[3:] - np.cross(tilt, relative[:3])
@@ -97,8 +97,8 @@ def test_under_j2_the_derivative_differs_by_the_tilt_of_the_orbit_plane():
     assert derivative == pytest.approx(expected, abs=2e-6)
 
 
-def test_a_chief_without_orbit_plane_is_rejected():
-    with pytest.raises(ConfigurationError, match="no orbit plane"):
+def test_chief_without_an_orbit_plane_is_rejected():
+    with pytest.raises(OrbitError, match="no orbit plane"):
         hill_rotation(np.array([7e6, 0.0, 0.0, 1.0, 0.0, 0.0]))
-    with pytest.raises(ConfigurationError, match="no orbit plane"):
+    with pytest.raises(OrbitError, match="no orbit plane"):
         hill_rotation(np.zeros(6))

@@ -1,4 +1,4 @@
-"""The cache of compiled code: keyed by content, shared by processes, done without if nothing is writable."""
+"""Cache of compiled code: keyed by content, safe for concurrent processes, optional."""
 
 import os
 import re
@@ -29,7 +29,7 @@ directory = jit._cache_directory
 
 @pytest.fixture
 def roots(tmp_path, monkeypatch):
-    """Two places for the cache: that of numba's configuration, and the user's."""
+    """Two cache directories: numba's configured one, and the user's."""
     monkeypatch.setattr(jit.numba.config, "CACHE_DIR", str(tmp_path / "configured"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "user"))
     return tmp_path
@@ -39,8 +39,8 @@ def test_cache_lies_where_numba_is_told(roots):
     assert Path(directory("orbit")).parent == roots / "configured"
 
 
-def test_cache_goes_to_the_user_when_the_package_is_read_only(roots, monkeypatch):
-    """Root can write anywhere, so the rejection is played."""
+def test_cache_of_a_read_only_package_is_the_users(roots, monkeypatch):
+    """Root can write anywhere, so the rejection is simulated."""
     write = tempfile.TemporaryFile
 
     def reject(dir):
@@ -52,7 +52,7 @@ def test_cache_goes_to_the_user_when_the_package_is_read_only(roots, monkeypatch
     assert Path(directory("orbit")).parent == roots / "user" / "formation_gnc"
 
 
-def test_nothing_writable_means_no_cache(roots, monkeypatch):
+def test_without_a_writable_directory_there_is_no_cache(roots, monkeypatch):
     def reject(dir):
         raise PermissionError(dir)
 
@@ -92,7 +92,7 @@ def test_kernels_are_built_from_the_folders_of_their_cache_key():
         assert all(each.startswith(keyed) for each in imported - free_of_kernels), file
 
 
-def test_processes_that_compile_at_once_do_not_disturb_one_another(tmp_path):
+def test_concurrent_compilation_is_safe(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(KERNEL)
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}

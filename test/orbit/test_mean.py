@@ -27,7 +27,7 @@ ORBITS = [
 ]
 
 
-def fly(elements, orbits, samples):
+def propagated(elements, orbits, samples):
     """Osculating states, evenly spaced in time."""
     step = elements.period / samples
     propagator = Propagator(step, substeps=max(1, round(800 / samples)))
@@ -42,11 +42,11 @@ def rate(times, angles):
 
 
 @pytest.mark.parametrize("orbit", ORBITS)
-def test_mean_orbit_keeps_its_shape_and_drifts_at_the_secular_rates(orbit):
-    times, states = fly(orbit, orbits=15, samples=20)
+def test_mean_elements_are_constant_or_drift_at_the_secular_rates(orbit):
+    times, states = propagated(orbit, orbits=15, samples=20)
     mean = [mean_elements(elements_from_state(state)) for state in states]
     osculating = [elements_from_state(state) for state in states]
-    # What remains is of second order, J2 (R/p)^2 of the wobble taken off; it is small beside it.
+    # The rest is of second order, J2 (R/p)^2 of the short-period variation.
     for name in ("semi_major_axis", "eccentricity", "inclination"):
         left = np.ptp([getattr(elements, name) for elements in mean])
         assert left < 0.004 * np.ptp([getattr(elements, name) for elements in osculating])
@@ -61,16 +61,16 @@ def test_mean_orbit_keeps_its_shape_and_drifts_at_the_secular_rates(orbit):
 
 @pytest.mark.parametrize("orbit", ORBITS)
 def test_mean_semi_major_axis_is_the_average_over_an_orbit(orbit):
-    """An average in time is one over the mean anomaly, but for terms of second order."""
-    _, states = fly(orbit, orbits=1, samples=2000)
+    """The average over time is that over the mean anomaly up to second-order terms."""
+    _, states = propagated(orbit, orbits=1, samples=2000)
     average = np.mean([elements_from_state(state).semi_major_axis for state in states[:-1]])
-    wobble = np.ptp([elements_from_state(state).semi_major_axis for state in states])
+    variation = np.ptp([elements_from_state(state).semi_major_axis for state in states])
     mean = mean_elements(orbit).semi_major_axis
-    assert average == pytest.approx(mean, abs=0.005 * wobble)
+    assert average == pytest.approx(mean, abs=0.005 * variation)
 
 
 @pytest.mark.parametrize("orbit", ORBITS)
-def test_mean_orbit_has_the_energy_of_the_true_one(orbit):
+def test_mean_orbit_has_the_energy_of_the_osculating_one(orbit):
     state = state_from_elements(orbit)
     r = np.linalg.norm(state[:3])
     oblate = MU * J2 * EARTH_RADIUS**2 / (2 * r**3) * (3 * (state[2] / r) ** 2 - 1)
@@ -91,7 +91,7 @@ def test_mean_orbit_has_the_energy_of_the_true_one(orbit):
     st.floats(0.0, tau),
     st.floats(0.0, tau),
 )
-def test_transformation_inverts_in_every_singular_case(eccentricity, inclination, perigee, anomaly):
+def test_transformation_is_invertible_at_singular_orbits(eccentricity, inclination, perigee, anomaly):
     state = state_from_elements(Elements(7e6 / (1 - eccentricity), eccentricity, inclination, 0.3, perigee, anomaly))
     mean = mean_state(state)
     assert np.isfinite(mean).all()
@@ -110,7 +110,7 @@ def test_transformation_is_smooth_at_circular_and_equatorial_orbits():
         assert np.linalg.norm((mean_state(near) - near - shift)[:3]) < 0.05
 
 
-def test_elements_and_states_tell_the_same():
+def test_elements_and_states_transform_alike():
     orbit = Elements(7e6, 0.01, 1.0, 0.3, 0.2, 0.1)
     assert state_from_elements(mean_elements(orbit)) == pytest.approx(mean_state(state_from_elements(orbit)), rel=1e-12)
     again = osculating_elements(mean_elements(orbit))
@@ -119,7 +119,7 @@ def test_elements_and_states_tell_the_same():
 
 
 def test_secular_rates_of_a_textbook_orbit():
-    """Sun-synchronous, 800 km, 98.603 deg: the node turns by 360 deg a tropical year."""
+    """Sun-synchronous, 800 km, 98.603 deg: nodal precession of 360 deg a tropical year."""
     node, perigee, _ = secular_rates(Elements(EARTH_RADIUS + 800e3, 0.0, radians(98.603), 0.0, 0.0, 0.0))
     assert np.degrees(node) * 86400 * 365.2422 == pytest.approx(360.0, rel=2e-3)
     critical = Elements(8e6, 0.1, np.arccos(np.sqrt(0.2)), 0.0, 0.0, 0.0)
@@ -127,8 +127,8 @@ def test_secular_rates_of_a_textbook_orbit():
     assert perigee < 0.0
 
 
-def test_equal_mean_semi_major_axes_keep_two_satellites_together():
-    """What mean elements are for: equal osculating axes drift apart, equal mean ones hardly."""
+def test_satellites_of_equal_mean_semi_major_axis_stay_together():
+    """Satellites of equal osculating semi-major axis drift apart."""
     chief = Elements(7e6, 0.001, 1.2, 0.0, 0.0, 0.0)
     mean = mean_elements(chief)
     ahead = Elements(

@@ -15,7 +15,7 @@ LEO = Elements(6978.1e3, 0.001, np.radians(85.0), 0.3, 0.2, 0.1)
 ECCENTRIC = Elements(2e7, 0.6, np.radians(50.0), 0.3, 0.2, 0.1)
 
 
-def fly(elements, ticks, tick, thrust=(0.0, 0.0, 0.0)):
+def propagated(elements, ticks, tick, thrust=(0.0, 0.0, 0.0)):
     propagator, states = Propagator(tick), state_from_elements(elements)[None]
     for k in range(ticks):
         states = propagator.propagate(k * tick, states, np.array([thrust]))
@@ -23,7 +23,7 @@ def fly(elements, ticks, tick, thrust=(0.0, 0.0, 0.0)):
 
 
 def reference(elements, duration, thrust=(0.0, 0.0, 0.0)):
-    """The same physics written out again and integrated by SciPy's adaptive method."""
+    """The same physics, independently written, by SciPy's adaptive method."""
 
     def potential_gradient(position):
         x, y, z = position
@@ -41,34 +41,35 @@ def reference(elements, duration, thrust=(0.0, 0.0, 0.0)):
     return solution.y[:, -1]
 
 
-def test_one_leo_orbit_at_one_second_ticks_to_a_hundredth_of_a_millimetre():
+def test_leo_orbit_at_one_second_ticks_is_accurate_to_10_micrometres():
     duration = 5801
     # Both methods are limited by rounding here: 1e-9 m a step.
-    assert np.linalg.norm((fly(LEO, duration, 1.0) - reference(LEO, duration))[:3]) < 1e-5
+    assert np.linalg.norm((propagated(LEO, duration, 1.0) - reference(LEO, duration))[:3]) < 1e-5
 
 
 def test_held_thrust_agrees_with_independent_integration():
     thrust = (1e-4, -2e-4, 3e-4)
-    assert np.linalg.norm((fly(LEO, 600, 10.0, thrust) - reference(LEO, 6000.0, thrust))[:3]) < 1e-5
+    assert np.linalg.norm((propagated(LEO, 600, 10.0, thrust) - reference(LEO, 6000.0, thrust))[:3]) < 1e-5
 
 
 @pytest.mark.parametrize(("elements", "coarse"), [(LEO, 50), (ECCENTRIC, 150)])
 def test_the_method_is_of_order_eight(elements, coarse):
     duration = elements.period
     truth = reference(elements, duration)
-    error = [np.linalg.norm((fly(elements, count, duration / count) - truth)[:3]) for count in (coarse, 2 * coarse)]
-    assert error[1] > 1e-6  # above rounding, so that the ratio says something
+    ends = [propagated(elements, count, duration / count) for count in (coarse, 2 * coarse)]
+    error = [np.linalg.norm((end - truth)[:3]) for end in ends]
+    assert error[1] > 1e-6  # above rounding, so that the ratio is significant
     assert 7.5 < np.log2(error[0] / error[1]) < 9.5
 
 
-def test_substeps_are_steps():
+def test_substeps_equal_shorter_ticks():
     state = state_from_elements(ECCENTRIC)[None]
     whole = Propagator(60.0, substeps=6).propagate(0.0, state, np.zeros((1, 3)))
-    assert whole[0] == pytest.approx(fly(ECCENTRIC, 6, 10.0), abs=0.0)
+    assert whole[0] == pytest.approx(propagated(ECCENTRIC, 6, 10.0), abs=0.0)
 
 
 def test_energy_and_axial_momentum_are_conserved():
-    start, end = state_from_elements(ECCENTRIC), fly(ECCENTRIC, 4000, 10.0)
+    start, end = state_from_elements(ECCENTRIC), propagated(ECCENTRIC, 4000, 10.0)
 
     def energy(state):
         r = np.linalg.norm(state[:3])
@@ -83,7 +84,7 @@ def test_energy_and_axial_momentum_are_conserved():
     assert axial(end) == pytest.approx(axial(start), rel=1e-13)
 
 
-def test_satellites_do_not_feel_one_another():
+def test_satellites_are_independent():
     together = np.array([state_from_elements(LEO), state_from_elements(ECCENTRIC)])
     thrust = np.array([[0.0, 1e-4, 0.0], [1e-4, 0.0, 0.0]])
     propagator = Propagator(30.0)
@@ -103,7 +104,7 @@ def test_hill_frame_forces_equal_the_same_inertial_accelerations():
     assert np.array_equal(states, before)
 
 
-def test_advance_leaves_its_arguments_alone_and_repeats_to_the_bit():
+def test_propagation_is_pure_and_reproducible_to_the_bit():
     states = state_from_elements(LEO)[None]
     before = states.copy()
     propagator = Propagator(1.0)
@@ -123,7 +124,7 @@ def test_gradient_is_the_derivative_of_acceleration():
     assert abs(np.trace(gradient(position))) < 1e-20
 
 
-def test_transition_matrix_is_the_derivative_of_the_state_and_symplectic():
+def test_transition_is_symplectic_and_the_derivative_of_the_state():
     state, thrust = state_from_elements(LEO), np.array([1e-4, 0.0, -1e-4])
     end, transition = advance_with_transition(state, thrust, 60.0, 4)
     assert end == pytest.approx(Propagator(60.0, substeps=4).propagate(0.0, state[None], thrust[None])[0], abs=0.0)
@@ -139,7 +140,7 @@ def test_transition_matrix_is_the_derivative_of_the_state_and_symplectic():
 
 
 @pytest.mark.parametrize("tick", [0.0, -1.0, float("nan"), float("inf")])
-def test_a_tick_must_be_a_positive_time(tick):
+def test_tick_must_be_finite_and_positive(tick):
     with pytest.raises(ConfigurationError, match="tick is"):
         Propagator(tick)
 

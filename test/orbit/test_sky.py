@@ -14,7 +14,7 @@ SERIES = {"sun": sun, "moon": moon}
 
 @pytest.fixture(scope="module")
 def ephemeris():
-    """DE421 as the package skyfield-data ships it."""
+    """DE421 from the package skyfield-data."""
     reason = "comparison with JPL's DE421 needs the verification extras (jplephem, skyfield-data)"
     spk = pytest.importorskip("jplephem.spk", reason=reason)
     data = pytest.importorskip("skyfield_data", reason=reason)
@@ -25,7 +25,7 @@ def ephemeris():
 
 @pytest.mark.parametrize(("body", "angle", "distance"), [("sun", 0.02, 1e-4), ("moon", 0.1, 1.5e-3)])
 def test_directions_agree_with_the_jpl_ephemeris_from_1950_to_2050(ephemeris, body, angle, distance):
-    days = np.linspace(-50 * 365.25, 50 * 365.25, 5000)  # 7.3 days apart: all phases of the month are met
+    days = np.linspace(-50 * 365.25, 50 * 365.25, 5000)  # 7.3 days apart: all phases of the month
     earth = ephemeris[3, 399].compute(2451545.0 + days)[:3]
     if body == "moon":
         truth = ephemeris[3, 301].compute(2451545.0 + days)[:3] - earth
@@ -39,7 +39,7 @@ def test_directions_agree_with_the_jpl_ephemeris_from_1950_to_2050(ephemeris, bo
     assert np.abs(lengths - 1.0).max() < distance
 
 
-def test_sun_stands_over_the_equator_at_the_march_equinox():
+def test_sun_is_on_the_equator_at_the_march_equinox():
     """20 March 2025, 09:01:28 UTC (almanac), of date; J2000 lags by the precession of 25 years, 0.35 deg."""
     time = (9210 - 0.5) * DAY + 9 * 3600 + 88 + 69.184
     x, y, z = sun(time)
@@ -48,7 +48,7 @@ def test_sun_stands_over_the_equator_at_the_march_equinox():
     assert degrees(longitude + precession) == pytest.approx(0.0, abs=0.02)
 
 
-def test_distances_stay_between_the_almanac_extremes():
+def test_distances_are_within_the_almanac_extremes():
     days = np.arange(0.0, 365.25 * 20, 1.0)
     suns = np.array([np.linalg.norm(sun(day * DAY)) for day in days]) / ASTRONOMICAL_UNIT
     assert 0.9832 < suns.min() < 0.9834
@@ -58,8 +58,8 @@ def test_distances_stay_between_the_almanac_extremes():
     assert 406.0e6 < moons.max() < 407.2e6
 
 
-def test_new_moon_hides_the_sun_where_an_eclipse_was_total():
-    """8 April 2024, 18:17:20 UTC: the shadow's axis passes the Earth's centre at 0.3431 radii (gamma)."""
+def test_sun_and_moon_align_at_a_total_eclipse():
+    """8 April 2024, 18:17:20 UTC: the axis of the shadow is 0.3431 radii (gamma) from the Earth's centre."""
     time = (8864 - 0.5) * DAY + 18 * 3600 + 17 * 60 + 20 + 69.184
     s, m = np.array(sun(time)), np.array(moon(time))
     distance = np.linalg.norm(np.cross(m, s)) / np.linalg.norm(s) / 6378.137e3

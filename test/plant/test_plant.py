@@ -1,3 +1,5 @@
+"""Plant: truth against independent integration, thrust, misses and fixes, and parameters."""
+
 import math
 from copy import deepcopy
 from typing import Any
@@ -12,7 +14,8 @@ from scipy.integrate import solve_ivp
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.orbit.constants import EARTH_RADIUS, J2, MU
 from formation_gnc.parameters import load
-from formation_gnc.plant.plant import Plant, PlantParameters
+from formation_gnc.plant.parameters import PlantParameters
+from formation_gnc.plant.plant import Plant
 from formation_gnc.records import Measurement, Truth
 
 Array = NDArray[np.float64]
@@ -36,15 +39,15 @@ def plant(**values: Any) -> Plant:
     return Plant(load(PlantParameters, VALUES | {name.replace("__", "."): value for name, value in values.items()}))
 
 
-def observe(flown: Plant) -> tuple[Truth, dict[str, Measurement]]:
-    measurements = flown.measure()
-    return flown.truth(), measurements
+def observe(simulated: Plant) -> tuple[Truth, dict[str, Measurement]]:
+    measurements = simulated.measure()
+    return simulated.truth(), measurements
 
 
-def fly(flown: Plant, ticks: int, forces: dict[str, Array]) -> None:
+def run(simulated: Plant, ticks: int, forces: dict[str, Array]) -> None:
     for _ in range(ticks):
-        observe(flown)
-        flown.step(forces)
+        observe(simulated)
+        simulated.step(forces)
 
 
 def hill_axes(chief: Array) -> Array:
@@ -64,7 +67,7 @@ def gravity(position: Array) -> Array:
 
 
 def integrated(state: Array, duration: float, acceleration: Array) -> Array:
-    """An orbit by SciPy, an order of magnitude more accurate than what is asked of the plant."""
+    """Inertial state after a duration, by SciPy, an order of magnitude more accurate than the tolerances."""
 
     def rate(_: float, y: Array) -> Array:
         return np.concatenate([y[3:], gravity(y[:3]) + acceleration])
@@ -73,7 +76,7 @@ def integrated(state: Array, duration: float, acceleration: Array) -> Array:
     return np.asarray(solution.y[:, -1])
 
 
-def test_the_deputy_starts_where_it_is_put_relative_to_the_chief() -> None:
+def test_deputy_starts_at_its_relative_state() -> None:
     truth, _ = observe(plant())
     assert truth.deputies[0].relative_state == pytest.approx(AWAY, abs=ROUNDING)
     separation = truth.deputies[0].inertial_state[:3] - truth.chief_state[:3]
@@ -81,30 +84,30 @@ def test_the_deputy_starts_where_it_is_put_relative_to_the_chief() -> None:
 
 
 @pytest.mark.parametrize("tick", [1.0, 60.0])
-def test_an_orbit_is_integrated_to_better_than_a_millimetre(tick: float) -> None:
+def test_orbit_is_integrated_to_better_than_a_millimetre(tick: float) -> None:
     interval = {f"deputy1__sensors__{name}__interval": 60.0 for name in ("radius", "range_rate", "latitude")}
-    flown = plant(tick=tick, **interval)
-    start, _ = observe(flown)
+    simulated = plant(tick=tick, **interval)
+    start, _ = observe(simulated)
     orbit = 5820.0  # s; whole ticks, a little over one revolution
-    fly(flown, round(orbit / tick), {"deputy1": np.zeros(3)})
-    end, _ = observe(flown)
+    run(simulated, round(orbit / tick), {"deputy1": np.zeros(3)})
+    end, _ = observe(simulated)
     for before, after in (
         (start.chief_state, end.chief_state),
         (start.deputies[0].inertial_state, end.deputies[0].inertial_state),
     ):
         true = integrated(before, orbit, np.zeros(3))
         assert np.linalg.norm(after[:3] - true[:3]) < 1e-3
-        assert np.linalg.norm(after[3:] - true[3:]) < 1e-6  # the same at an orbit's rate
+        assert np.linalg.norm(after[3:] - true[3:]) < 1e-6  # 1 mm times the orbital rate
 
 
-def test_a_force_acts_along_the_hill_axes_of_the_start_of_its_tick_on_the_deputy_alone() -> None:
-    flown, free = plant(tick=10.0), plant(tick=10.0)
-    fly(flown, 3, {})
-    fly(free, 3, {})
-    truth, _ = observe(flown)
-    flown.step(PUSH)
+def test_force_acts_along_the_hill_axes_at_the_start_of_its_tick() -> None:
+    simulated, free = plant(tick=10.0), plant(tick=10.0)
+    run(simulated, 3, {})
+    run(free, 3, {})
+    truth, _ = observe(simulated)
+    simulated.step(PUSH)
     free.step({})
-    pushed, _ = observe(flown)
+    pushed, _ = observe(simulated)
     coasted, _ = observe(free)
     acceleration = PUSH["deputy1"] / 100.0 @ hill_axes(truth.chief_state)
     true = integrated(truth.deputies[0].inertial_state, 10.0, acceleration)
@@ -115,18 +118,18 @@ def test_a_force_acts_along_the_hill_axes_of_the_start_of_its_tick_on_the_deputy
     assert gained == pytest.approx(impulse, abs=2e-4 * np.linalg.norm(impulse))  # gravity's gradient: (n t)^2
 
 
-def test_the_truth_and_the_measurement_report_the_force_of_the_tick_before() -> None:
-    flown = plant()
-    truth, measurements = observe(flown)
+def test_truth_and_measurement_report_the_force_of_the_previous_tick() -> None:
+    simulated = plant()
+    truth, measurements = observe(simulated)
     assert not truth.deputies[0].applied_force.any()
     assert not measurements["deputy1"].applied_force.any()
-    flown.step(PUSH)
-    truth, measurements = observe(flown)
+    simulated.step(PUSH)
+    truth, measurements = observe(simulated)
     assert truth.deputies[0].applied_force.tolist() == PUSH["deputy1"].tolist()
     assert measurements["deputy1"].applied_force.tolist() == PUSH["deputy1"].tolist()
 
 
-def test_a_force_beyond_the_limit_is_cut_on_each_axis() -> None:
+def test_force_is_limited_on_each_axis() -> None:
     cut, within = plant(deputy1__thrusters__limit=[0.01, 0.0, 0.02]), plant()
     cut.step({"deputy1": np.array([-5.0, 0.003, 0.002])})
     within.step({"deputy1": np.array([-0.01, 0.0, 0.002])})
@@ -135,10 +138,10 @@ def test_a_force_beyond_the_limit_is_cut_on_each_axis() -> None:
     assert np.array_equal(one.inertial_state, other.inertial_state)
 
 
-def test_without_thrust_mass_does_not_matter_and_with_it_acceleration_is_force_over_mass() -> None:
+def test_acceleration_is_force_over_mass() -> None:
     light, heavy = plant(deputy1__mass=50.0), plant(deputy1__mass=200.0)
-    fly(light, 20, {"deputy1": np.zeros(3)})
-    fly(heavy, 20, {"deputy1": np.zeros(3)})
+    run(light, 20, {"deputy1": np.zeros(3)})
+    run(heavy, 20, {"deputy1": np.zeros(3)})
     assert np.array_equal(observe(light)[0].deputies[0].inertial_state, observe(heavy)[0].deputies[0].inertial_state)
     light.step({"deputy1": np.array([0.001, 0.0, 0.0])})
     heavy.step({"deputy1": np.array([0.004, 0.0, 0.0])})
@@ -155,12 +158,12 @@ def test_without_thrust_mass_does_not_matter_and_with_it_acceleration_is_force_o
         {"somebody": np.zeros(3)},
     ],
 )
-def test_a_deputy_without_a_finite_answer_coasts_for_the_tick_and_gets_a_fix(
+def test_deputy_without_a_finite_command_coasts_and_gets_a_fix(
     forces: dict[str, Array],
 ) -> None:
     missed, coasting = plant(), plant()
-    fly(missed, 5, PUSH)
-    fly(coasting, 5, PUSH)
+    run(missed, 5, PUSH)
+    run(coasting, 5, PUSH)
     assert missed.step(forces) == ["deputy1"]
     assert coasting.step({"deputy1": np.zeros(3)}) == []
     truth, measurements = observe(missed)
@@ -169,7 +172,7 @@ def test_a_deputy_without_a_finite_answer_coasts_for_the_tick_and_gets_a_fix(
     assert not truth.deputies[0].applied_force.any()
     measurement = measurements["deputy1"]
     assert measurement.fix_available
-    # six normal errors of 0.5 m and 0.5 mm/s stay inside six sigma
+    # Normal errors of 0.5 m and 0.5 mm/s are within six sigma.
     error = (measurement.fix - truth.deputies[0].relative_state) / np.repeat([0.5, 0.0005], 3)
     assert 0.0 < np.abs(error).max() < 6.0
     assert not without["deputy1"].fix_available
@@ -178,14 +181,14 @@ def test_a_deputy_without_a_finite_answer_coasts_for_the_tick_and_gets_a_fix(
     assert not observe(missed)[1]["deputy1"].fix_available
 
 
-def test_the_first_tick_brings_a_fix() -> None:
-    flown = plant()
-    assert observe(flown)[1]["deputy1"].fix_available
-    flown.step(PUSH)
-    assert not observe(flown)[1]["deputy1"].fix_available
+def test_first_measurement_has_a_fix() -> None:
+    simulated = plant()
+    assert observe(simulated)[1]["deputy1"].fix_available
+    simulated.step(PUSH)
+    assert not observe(simulated)[1]["deputy1"].fix_available
 
 
-def test_one_deputy_does_not_feel_another_nor_its_misses() -> None:
+def test_deputies_and_their_misses_are_independent() -> None:
     other = {"deputies": ["deputy1", "deputy2"], "deputy2__relative_state": [0.0, 50.0, 0.0, 0.0, 0.0, 0.0]}
     alone, together = plant(), plant(**other)
     for tick in range(30):
@@ -200,12 +203,12 @@ def test_one_deputy_does_not_feel_another_nor_its_misses() -> None:
         assert missed == (["deputy2"] if tick % 3 == 0 else [])
 
 
-def test_a_miss_does_not_change_the_noise_of_later_readings() -> None:
+def test_noise_of_later_readings_does_not_depend_on_a_miss() -> None:
     kept, lost = plant(tick=10.0), plant(tick=10.0)
     noise: dict[str, list[float]] = {"kept": [], "lost": []}
     for tick in range(20):
-        for name, flown in (("kept", kept), ("lost", lost)):
-            truth, measurements = observe(flown)
+        for name, simulated in (("kept", kept), ("lost", lost)):
+            truth, measurements = observe(simulated)
             radius = float(np.linalg.norm(truth.deputies[0].inertial_state[:3]))
             noise[name].append(measurements["deputy1"].readings[0].values[0] - radius)
         kept.step({"deputy1": np.zeros(3)})
@@ -213,31 +216,31 @@ def test_a_miss_does_not_change_the_noise_of_later_readings() -> None:
     assert noise["kept"] == pytest.approx(noise["lost"], abs=ROUNDING)
 
 
-def test_the_same_seed_gives_the_same_bits_and_another_seed_only_other_noise() -> None:
+def test_seed_determines_the_noise_to_the_bit_and_nothing_else() -> None:
     first, again, other = plant(seed=3), plant(seed=3), plant(seed=4)
     for _ in range(25):
         (truth, measured), (same, measured_again), (same_too, measured_otherwise) = (
-            observe(flown) for flown in (first, again, other)
+            observe(simulated) for simulated in (first, again, other)
         )
         assert np.array_equal(truth.deputies[0].inertial_state, same.deputies[0].inertial_state)
         assert np.array_equal(truth.deputies[0].inertial_state, same_too.deputies[0].inertial_state)
         assert measured["deputy1"].readings == measured_again["deputy1"].readings
         if measured["deputy1"].readings:
             assert measured["deputy1"].readings != measured_otherwise["deputy1"].readings
-        for flown in (first, again, other):
-            flown.step(PUSH)
+        for simulated in (first, again, other):
+            simulated.step(PUSH)
 
 
-def test_what_was_observed_does_not_change_afterwards() -> None:
-    flown = plant()
-    observed = observe(flown)
+def test_records_do_not_change_after_they_are_returned() -> None:
+    simulated = plant()
+    observed = observe(simulated)
     kept = deepcopy(observed)
-    fly(flown, 12, PUSH)
+    run(simulated, 12, PUSH)
     assert repr(observed) == repr(kept)
 
 
 @given(ns=st.integers(1, 10**12), tick_ns=st.integers(1, 10**11))
-def test_every_tick_that_begins_within_the_duration_is_flown(ns: int, tick_ns: int) -> None:
+def test_ticks_are_those_that_begin_within_the_duration(ns: int, tick_ns: int) -> None:
     values = VALUES | {"tick": tick_ns * 1e-9, "duration": ns * 1e-9}
     if ns < tick_ns:
         with pytest.raises(ConfigurationError, match="it must be a tick or more"):
@@ -247,12 +250,12 @@ def test_every_tick_that_begins_within_the_duration_is_flown(ns: int, tick_ns: i
         assert (ticks - 1) * tick_ns < ns <= ticks * tick_ns
 
 
-def test_a_duration_of_part_ticks_ends_with_the_last_tick_that_began() -> None:
-    flown = plant(tick=2.0, duration=5.0)
+def test_run_ends_after_the_last_tick_that_begins_in_the_duration() -> None:
+    simulated = plant(tick=2.0, duration=5.0)
     stamps = []
-    while not flown.finished:
-        stamps.append(observe(flown)[0].time)
-        flown.step({})
+    while not simulated.finished:
+        stamps.append(observe(simulated)[0].time)
+        simulated.step({})
     assert stamps == [0, 2_000_000_000, 4_000_000_000]
 
 
@@ -288,7 +291,7 @@ def rejection(values: dict[str, Any]) -> str:
         ),
     ],
 )
-def test_what_cannot_be_flown_is_rejected_in_words(name: str, value: Any, words: str) -> None:
+def test_parameters_that_cannot_be_flown_are_rejected_by_name(name: str, value: Any, words: str) -> None:
     assert rejection(VALUES | {name: value}).startswith(words)
 
 
@@ -302,7 +305,7 @@ def test_what_cannot_be_flown_is_rejected_in_words(name: str, value: Any, words:
         (["é"], "'é' is not allowed; a name has letters, digits and _ only"),
     ],
 )
-def test_names_of_deputies_are_different_and_fit_for_namespaces(names: list[str], words: str) -> None:
+def test_names_of_deputies_must_differ_and_be_namespaces(names: list[str], words: str) -> None:
     values = {name: value for name, value in VALUES.items() if not name.startswith("deputy1")}
     states = {f"{name}.relative_state": AWAY for name in names}
     assert rejection(values | states | {"deputies": names}) == f"parameter deputies: {words}"

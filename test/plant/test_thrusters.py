@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import ParameterError
 from formation_gnc.parameters import load
 from formation_gnc.plant.thrusters import STANDARD_GRAVITY, Denial, Thruster, ThrusterParameters
 
@@ -25,14 +25,14 @@ def fire(thruster, command, eclipse=False, mass=100.0):
 
 
 @given(COMMAND)
-def test_an_ideal_thruster_gives_what_is_asked(command):
+def test_ideal_thruster_applies_the_command(command):
     force, state, reasons = fire(thruster(), command)
     assert np.array_equal(force, command)
     assert (state.mass, reasons) == (100.0, ())
 
 
 @given(COMMAND)
-def test_each_axis_keeps_its_own_limit_and_says_so(command):
+def test_each_axis_has_its_own_limit_and_reports_it(command):
     limit = np.array([0.01, 0.02, 0.03])
     force, _, reasons = fire(thruster(limit=tuple(limit)), command)
     assert np.array_equal(force, np.clip(command, -limit, limit))
@@ -40,7 +40,7 @@ def test_each_axis_keeps_its_own_limit_and_says_so(command):
 
 
 @given(COMMAND)
-def test_a_total_limit_shortens_the_force_and_keeps_its_direction(command):
+def test_total_limit_scales_the_force_in_its_direction(command):
     force, _, _ = fire(thruster(total_limit=0.02), command)
     assert np.linalg.norm(force) <= 0.02 * (1 + 1e-15)
     assert np.cross(force, command) == pytest.approx(0.0, abs=1e-17)
@@ -85,7 +85,7 @@ def test_lag_approaches_the_command_exponentially_with_exact_impulse():
     assert sum(impulse) == pytest.approx(0.6 * (8.0 - 3.0 * (1 - np.exp(-8.0 / 3.0))))
 
 
-def test_misalignment_turns_the_force_by_a_fixed_angle():
+def test_misalignment_rotates_the_force_by_a_fixed_angle():
     one = thruster(misalignment=0.02)
     first, state, _ = fire(one, [0.01, 0.0, 0.0])
     second, _, _ = one.apply([0.02, 0.0, 0.0], False, state)
@@ -96,12 +96,12 @@ def test_misalignment_turns_the_force_by_a_fixed_angle():
 
 
 def test_misalignment_has_its_standard_deviation():
-    """The force along x is displaced along y by its turn about z."""
+    """A force along x has a y component by the rotation about z."""
     turns = [fire(thruster(misalignment=0.01, seed=k), [1.0, 0.0, 0.0])[0][1] for k in range(2000)]
     assert np.std(turns) == pytest.approx(0.01, rel=0.05)  # 3 sigma of 2,000 samples
 
 
-def test_noise_scales_the_force_and_never_makes_one():
+def test_noise_is_proportional_to_the_force():
     one = thruster(magnitude_noise=0.05)
     state, forces = one.start(100.0), []
     for _ in range(4000):
@@ -128,18 +128,18 @@ def test_propellant_follows_the_rocket_equation():
         force, after, _ = one.apply([1.0, 0.0, 0.0], False, state)
         speed += force[0] / state.mass
         state = after
-    # The mass at a tick's start holds over the tick: 5 mg/s of 100 kg, 5e-6 relative.
+    # The mass is held over a tick: 5 mg/s of 100 kg, 5e-6 relative.
     assert speed == pytest.approx(200.0 * STANDARD_GRAVITY * np.log(100.0 / state.mass), rel=1e-5)
 
 
-def test_three_thrusters_burn_by_axis_and_one_gimballed_by_magnitude():
+def test_propellant_flow_is_by_axis_or_of_one_gimballed_thruster():
     _, by_axis, _ = fire(thruster(specific_impulse=200.0), [0.03, 0.04, 0.0])
     _, gimballed, _ = fire(thruster(specific_impulse=200.0, total_limit=1.0), [0.03, 0.04, 0.0])
     assert 100.0 - by_axis.mass == pytest.approx(0.07 / (200.0 * STANDARD_GRAVITY))
     assert 100.0 - gimballed.mass == pytest.approx(0.05 / (200.0 * STANDARD_GRAVITY))
 
 
-def test_a_tank_gives_its_last_drop_and_then_nothing_and_says_so():
+def test_tank_gives_its_last_propellant_and_reports_empty():
     one = thruster(specific_impulse=200.0, dry_mass=50.0)
     drop = 0.25 * 1.0 / (200.0 * STANDARD_GRAVITY)
     force, state, reasons = fire(one, [1.0, 0.0, 0.0], mass=50.0 + drop)
@@ -148,17 +148,17 @@ def test_a_tank_gives_its_last_drop_and_then_nothing_and_says_so():
     force, state, reasons = one.apply([1.0, 0.0, 0.0], False, state)
     assert np.array_equal(force, np.zeros(3))
     assert (state.mass, reasons) == (50.0, (Denial.EMPTY,))
-    assert one.apply([0.0, 0.0, 0.0], False, state)[2] == ()  # nothing was asked, nothing denied
+    assert one.apply([0.0, 0.0, 0.0], False, state)[2] == ()  # no command, nothing denied
 
 
-def test_eclipse_stops_thrust_only_where_so_configured():
+def test_eclipse_cuts_thrust_only_if_configured():
     force, state, reasons = fire(thruster(off_in_eclipse=True, lag=5.0), [0.01, 0.0, 0.0], eclipse=True)
     assert np.array_equal(force, np.zeros(3))
     assert (state.output, reasons) == ((0.0, 0.0, 0.0), (Denial.ECLIPSE,))
     assert fire(thruster(), [0.01, 0.0, 0.0], eclipse=True)[0][0] == 0.01
 
 
-def test_a_failed_axis_gives_nothing_and_may_fail_in_flight():
+def test_failed_axis_has_no_force_and_may_fail_in_flight():
     one = thruster()
     _, state, reasons = fire(one, [0.01, 0.02, 0.03])
     assert reasons == ()
@@ -169,7 +169,7 @@ def test_a_failed_axis_gives_nothing_and_may_fail_in_flight():
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf")])
-def test_a_command_that_is_not_finite_gives_no_thrust(bad):
+def test_non_finite_command_gives_no_thrust(bad):
     force, state, reasons = fire(thruster(), [bad, 0.01, 0.0])
     assert np.array_equal(force, np.zeros(3))
     assert (state.mass, reasons) == (100.0, (Denial.NOT_FINITE,))
@@ -183,7 +183,7 @@ def test_a_command_that_is_not_finite_gives_no_thrust(bad):
     st.floats(0.0, 20.0),
     st.floats(50.0, 50.0001),
 )
-def test_whatever_the_configuration_force_and_mass_stay_within_bounds(command, eclipse, total, quantum, lag, mass):
+def test_force_and_mass_are_within_bounds_in_any_configuration(command, eclipse, total, quantum, lag, mass):
     one = thruster(
         limit=(0.02, 0.02, 0.02),
         total_limit=total,
@@ -199,14 +199,14 @@ def test_whatever_the_configuration_force_and_mass_stay_within_bounds(command, e
     assert 50.0 <= state.mass <= mass
 
 
-def test_bad_masses_and_parameters_are_rejected():
-    with pytest.raises(ConfigurationError, match=r"mass: -1\.0 kg"):
+def test_invalid_masses_and_parameters_are_rejected():
+    with pytest.raises(ParameterError, match=r"mass: -1\.0 kg"):
         thruster().start(-1.0)
-    with pytest.raises(ConfigurationError, match=r"at least the dry mass, 50\.0 kg"):
+    with pytest.raises(ParameterError, match=r"at least the dry mass, 50\.0 kg"):
         thruster(dry_mass=50.0).start(40.0)
-    with pytest.raises(ConfigurationError, match="quantum"):
+    with pytest.raises(ParameterError, match="quantum"):
         thruster(quantum=2.0)
-    with pytest.raises(ConfigurationError, match=r"parameter limit: .* at least 0"):
+    with pytest.raises(ParameterError, match=r"parameter limit: .* at least 0"):
         load(ThrusterParameters, {"limit": [-1.0, 0.0, 0.0]})
-    with pytest.raises(ConfigurationError, match="3 values"):
+    with pytest.raises(ParameterError, match="3 values"):
         load(ThrusterParameters, {"limit": [1.0]})

@@ -1,4 +1,4 @@
-"""Random orbits take as long as they take: no deadline on a shared machine."""
+"""Hypothesis without deadlines: the cost of a random orbit varies."""
 
 from hypothesis import settings
 

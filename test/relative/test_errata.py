@@ -1,4 +1,4 @@
-"""Misprints in the sources, each shown to be one: the printed form fails where the corrected one holds.
+"""Misprints in the sources: the printed form fails where the corrected one holds.
 
 The table is docs/theory/errata.md. Joshi's state order is [x, x', y, y', z, z']; it is translated here.
 """
@@ -47,7 +47,7 @@ def test_joshi_3_21_control_enters_with_the_other_sign():
     control = np.array([1e-3, 2e-3, -1e-3])
     acceleration = NonlinearModel(CHIEF).derivative(300.0, STATE, control)[3:]
     without = NonlinearModel(CHIEF).derivative(300.0, STATE)[3:]
-    # Printed: relative acceleration + ... + (U + a_p) = 0, which makes the deputy go against its thrust.
+    # Printed: relative acceleration + ... + (U + a_p) = 0, with the deputy accelerating against its thrust.
     np.testing.assert_allclose(acceleration, inertial_difference(STATE, HERE, control), rtol=1e-11)
     assert np.dot(acceleration - without, control) > 0.0
 
@@ -94,7 +94,7 @@ def test_joshi_3_48_sign_and_the_factor_two():
     assert not np.allclose(-strength * printed_components(chief, doubled=False), truth, rtol=0.1, atol=1e-12)
 
 
-def test_joshi_3_48_leaves_out_the_turn_between_the_two_satellites_axes():
+def test_joshi_3_48_neglects_the_rotation_between_the_two_axes():
     # Even with sign and factors right, each J belongs to its own satellite's axes, which differ by rho / r:
     # a part of the difference as large as the difference itself, and no smaller for a deputy that is near.
     for size in (1.0, 1e-2):
@@ -284,10 +284,10 @@ def test_joshi_6_41_derivative_of_the_fourth_power():
 
 def test_joshi_table_8_2_perigee_is_inside_the_earth():
     assert EARTH_RADIUS > 11114.5e3 * (1.0 - 0.5)
-    assert KeplerChief(11114.5e3, 0.5).at(0.0).radius < EARTH_RADIUS  # which flies all the same
+    assert KeplerChief(11114.5e3, 0.5).at(0.0).radius < EARTH_RADIUS  # accepted all the same
 
 
-def test_roberts_37_coriolis_term_has_the_rate_and_not_its_derivative():
+def test_roberts_37_coriolis_term_is_in_the_rate():
     # The reference turns at a constant rate, so that the printed term would vanish and with it the coupling
     # of x and y by which (24) has 2 n c.
     model = SchweighartSedwickModel(CircularReference(7e6, 1.0))
@@ -352,7 +352,7 @@ def test_kremmydas_4_3_radial_rate_centres_the_ellipse_with_a_minus(sign, offset
 
 
 @pytest.mark.parametrize(("first", "second", "constant"), [(-1.0, 1.0 / 3.0, True), (1.0, 1.0, False)])
-def test_kremmydas_4_4_tetrahedron_keeps_its_volume_with_the_codes_signs(first, second, constant):
+def test_kremmydas_4_4_tetrahedron_volume_needs_the_codes_signs(first, second, constant):
     model, a = HillModel(1.06e-3), 129.9
     w, root = model.mean_motion, math.sqrt(3.0)
     one = [
@@ -391,14 +391,14 @@ def test_neokleous_1_4_separation_is_the_satellite_less_the_point():
     assert tidal > 0.0
 
 
-def test_neokleous_1_11_is_right():
+def test_neokleous_1_11_is_correct():
     r, w, a = HERE.radius, HERE.angular_rate, HERE.angular_acceleration
     k = MU / r**3
     printed = [[2 * k + w**2, a, 0], [-a, w**2 - k, 0], [0, 0, -k]]
     np.testing.assert_allclose(jacobian(np.zeros(6), HERE)[3:, :3], printed, rtol=1e-12, atol=1e-22)
 
 
-def test_neokleous_2_18_c_has_no_mu_and_belongs_into_both_rows():
+def test_neokleous_2_18_c_is_without_mu_and_in_both_rows():
     reference = CircularReference(42164e3, 0.0)
     c2 = 1 + 3 * J2 * EARTH_RADIUS**2 / (8 * reference.radius**2) * (1 + 3 * math.cos(2 * reference.inclination))
     assert math.sqrt(c2) * reference.mean_motion == approx(reference.rate, rel=1e-12)
@@ -408,7 +408,7 @@ def test_neokleous_2_18_c_has_no_mu_and_belongs_into_both_rows():
     np.testing.assert_array_equal(block, -block.T)
 
 
-def test_neokleous_3_13_second_measurement_is_the_derivative_of_the_first():
+def test_neokleous_3_13_second_measurement_is_the_firsts_derivative():
     n, state = 7.29e-5, np.array([100.0, 300.0, -50.0, 0.01, 0.02, 0.03])
     r1 = 42164e3
 

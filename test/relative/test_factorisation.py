@@ -50,7 +50,7 @@ def printed(state, chief, rate_of_change):
 
 
 @given(chiefs, times, states)
-def test_sdc1_is_the_nonlinear_equation(chief, time, state):
+def test_sdc1_equals_the_nonlinear_equations(chief, time, state):
     here = chief.at(time)
     expected = printed(state, here, here.angular_acceleration)
     # The printed form subtracts two terms of MU / r^2: that rounding is the tolerance.
@@ -58,7 +58,7 @@ def test_sdc1_is_the_nonlinear_equation(chief, time, state):
 
 
 @given(chiefs, times, states)
-def test_sdc2_is_the_circular_equation_at_the_chiefs_rate(chief, time, state):
+def test_sdc2_equals_the_circular_equations_at_the_chiefs_rate(chief, time, state):
     here = chief.at(time)
     x, y, z, vx, vy, vz = state
     r, w = here.radius, here.angular_rate
@@ -75,7 +75,7 @@ def test_sdc2_is_the_circular_equation_at_the_chiefs_rate(chief, time, state):
 
 
 @given(chiefs, times, states)
-def test_j2_factor_is_the_difference_of_two_accelerations(chief, time, state):
+def test_j2_factorisation_is_the_difference_of_two_accelerations(chief, time, state):
     here = chief.at(time)
     # The same place in a frame whose third axis is the pole: any one will do, J2 is symmetric about it.
     axis = np.cross(here.pole, [1.0, 0.0, 0.0] if abs(here.pole[0]) < 0.9 else [0.0, 1.0, 0.0])
@@ -103,7 +103,7 @@ def test_on_the_chief_the_factorisation_is_the_jacobian(chief, time):
     np.testing.assert_allclose(oblateness(still, here), oblate_gradient(still, here), rtol=1e-9, atol=1e-19)
 
 
-def test_sdc2_crosses_the_track_without_a_singularity():
+def test_sdc2_is_regular_at_zero_radial_separation():
     # The printed sigma_x = (r / x + 1) sigma_y grows without bound as x goes to 0 at y = 25 km.
     chief = KeplerChief(1e7).at(0.0)
     beside = [sdc2(np.array([x, 25e3, 10e3, 0, 0, 0]), chief)[3] for x in (-1e-6, 0.0, 1e-6)]
@@ -114,7 +114,7 @@ def test_sdc2_crosses_the_track_without_a_singularity():
 
 
 @given(chiefs, times)
-def test_sdc1_and_sdc2_are_hills_equations_close_to_a_circular_chief(chief, time):
+def test_sdc1_and_sdc2_near_a_circular_chief_are_hills_equations(chief, time):
     circular = KeplerChief(chief.semi_major_axis).at(time)
     w = circular.angular_rate
     for factorisation in (sdc1, sdc2):
@@ -124,7 +124,7 @@ def test_sdc1_and_sdc2_are_hills_equations_close_to_a_circular_chief(chief, time
         assert matrix[5, 2] == pytest.approx(-(w**2), rel=1e-8, abs=0.0)
 
 
-def test_several_states_at_once_give_the_single_matrices():
+def test_arrays_of_states_give_the_single_matrices():
     chief = OblateChief(Elements(7e6, 0.01, 1.0, 0.0, 0.3, 0.2)).at(100.0)
     states_ = np.arange(12.0).reshape(2, 6) * 1e3
     for factorisation in (sdc1, sdc2, sdc1_oblate):
@@ -133,7 +133,7 @@ def test_several_states_at_once_give_the_single_matrices():
             np.testing.assert_allclose(factorisation(state, chief), matrix, rtol=1e-13, atol=1e-20)
 
 
-def test_pole_of_an_integrated_chief_is_the_earths_axis():
+def test_pole_of_an_oblate_chief_is_the_earths_axis():
     chief = OblateChief(Elements(7e6, 0.01, 1.0, 0.5, 0.3, 0.2))
     here = chief.at(1234.0)
     assert isinstance(here, ChiefState)
@@ -141,7 +141,7 @@ def test_pole_of_an_integrated_chief_is_the_earths_axis():
 
 
 @pytest.mark.parametrize("factorise", [sdc1, sdc2, sdc1_oblate])
-def test_many_states_with_a_chief_each_are_one_by_one_the_same(factorise):
+def test_arrays_of_states_and_chiefs_give_the_single_matrices(factorise):
     chief = OblateChief(Elements(8.0e6, 0.1, 0.9, 0.3, 0.4, 0.5))
     times = np.linspace(0.0, 5000.0, 7)
     states = np.random.default_rng(3).standard_normal((7, 6)) * np.repeat([5e4, 50.0], 3)

@@ -1,4 +1,4 @@
-"""Gim and Alfriend's transition matrix against the variational equations, and its parts one by one."""
+"""Gim and Alfriend's transition matrix and its factors against the variational equations."""
 
 import math
 
@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import OrbitError
 from formation_gnc.orbit.constants import EARTH_RADIUS, J2
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import hill_transform, hill_transform_inverse, relative_from_inertial
@@ -65,7 +65,7 @@ def test_sigma_is_the_derivative_of_the_relative_state(elements):
 
 @settings(max_examples=15, deadline=None)
 @given(orbits, st.floats(0.0, 5.0))
-def test_transition_is_that_of_the_variational_equations(elements, turns):
+def test_transition_solves_the_variational_equations(elements, turns):
     model = GimAlfriendModel(elements)
     duration = turns * model.period
     chief = model.chief.inertial(0.0)
@@ -89,7 +89,7 @@ def test_error_falls_with_the_square_of_j2():
     assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.1)
 
 
-def test_transition_beats_tschauner_and_hempels_by_the_order_of_j2():
+def test_transition_improves_on_tschauner_hempel_by_the_order_of_j2():
     elements = Elements(8e6, 0.1, 1.0, 0.3, 0.4, 0.5)
     model = GimAlfriendModel(elements)
     duration = 2.0 * model.period
@@ -114,7 +114,7 @@ def test_transition_is_a_group_to_the_order_of_the_theory(elements, first, secon
     np.testing.assert_allclose(parts, whole, atol=50.0 * strength**2 * np.abs(whole).max() + 1e-11)
 
 
-def test_no_time_changes_nothing():
+def test_transition_over_zero_time_is_the_identity():
     model = GimAlfriendModel(Elements(8e6, 0.1, 1.0, 0.3, 0.4, 0.5))
     np.testing.assert_allclose(scaled(model.elements, model.transition(100.0, 0.0)), np.eye(6), atol=1e-13)
 
@@ -130,7 +130,7 @@ def test_bounded_start_agrees_with_the_nonlinear_condition():
     assert differences[1] / differences[0] == pytest.approx(4.0, rel=1e-2)
 
 
-def test_gravity_of_a_smaller_oblateness_leaves_the_two_body_problem():
+def test_transition_far_out_tends_to_the_two_body_problem():
     # Far out J2 fades as r^-2: the matrix tends to Yamanaka and Ankersen's.
     differences = []
     for axis in (4e7, 8e7):
@@ -142,11 +142,11 @@ def test_gravity_of_a_smaller_oblateness_leaves_the_two_body_problem():
 
 
 def test_equatorial_chief_is_rejected_by_name():
-    with pytest.raises(ConfigurationError, match="inclination"):
+    with pytest.raises(OrbitError, match="inclination"):
         GimAlfriendModel(Elements(4.2e7, 0.0, 0.0, 0.0, 0.0, 0.0))
 
 
-def test_forcing_is_that_of_the_integrated_equations():
+def test_input_matrix_is_that_of_the_integrated_equations():
     model = GimAlfriendModel(Elements(8e6, 0.1, 1.0, 0.3, 0.4, 0.5))
     _, ours = model.discretise(100.0, 60.0)
     _, exact = RelativeModel.discretise(OblateModel(model.chief), 100.0, 60.0)

@@ -1,4 +1,4 @@
-"""Hill's equations against their own right-hand side, conservation laws and printed closed forms."""
+"""Hill's equations against their right-hand side, conservation laws and printed closed forms."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import OrbitError
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.model import INPUT, integrate
 
@@ -15,7 +15,7 @@ durations = st.floats(-2e4, 2e4)
 
 
 @given(motions, st.floats(-25.0, 25.0), st.floats(-1e4, 1e4))
-def test_transition_and_forcing_are_the_matrix_exponential(mean_motion, angle, later):
+def test_discretisation_is_the_matrix_exponential(mean_motion, angle, later):
     # Compared in units of 1 / n, where all entries are of one size.
     joint = np.zeros((9, 9))
     joint[:6, :6] = HillModel(1.0).dynamics()
@@ -41,7 +41,7 @@ def test_transition_is_a_group_of_unit_determinant(mean_motion, first, second):
     assert np.linalg.det(model.transition(0.0, first)) == pytest.approx(1.0, rel=1e-6)
 
 
-def test_short_tick_keeps_full_precision():
+def test_discretisation_of_a_short_tick_has_full_precision():
     # A millisecond: naive angle - sin(angle) would leave no correct digit. The Taylor terms are exact here.
     n, tick = 1e-3, 1e-3
     free, forced = HillModel(n).discretise(0.0, tick)
@@ -71,7 +71,7 @@ def test_bounded_motion_closes_after_one_orbit(mean_motion, numbers):
     assert state[3] == numbers[3] * mean_motion
 
 
-def test_closed_form_is_the_one_printed_with_constant_thrust():
+def test_closed_form_under_constant_thrust_is_the_printed_one():
     # Kremmydas section 1.1.3, in its axes: x along-track, y against the normal, z to Earth.
     omega, t = 1.0618e-3, 2345.0
     x0, y0, z0, dx0, dy0, dz0 = 120.0, -70.0, 35.0, 0.02, -0.04, 0.03
@@ -86,7 +86,7 @@ def test_closed_form_is_the_one_printed_with_constant_thrust():
     np.testing.assert_allclose(ours[:3], [-z, x, -y], rtol=1e-12)
 
 
-def test_arrays_of_durations_and_states_give_the_single_results():
+def test_arrays_of_durations_and_states_give_single_results():
     model = HillModel(1.1e-3)
     times = np.array([0.0, 10.0, 700.0])
     states = np.arange(18.0).reshape(3, 6)
@@ -97,7 +97,7 @@ def test_arrays_of_durations_and_states_give_the_single_results():
 
 
 def test_integration_of_the_right_hand_side_gives_the_closed_form():
-    # The integrator that models without closed forms use, in steps of 1/190 orbit.
+    # The integrator of models without a closed form, in steps of 1/190 orbit.
     model = HillModel(1.1e-3)
     state = np.array([100.0, -200.0, 50.0, 0.1, -0.2, 0.05])
     thrust = np.array([1e-4, -2e-4, 3e-4])
@@ -106,6 +106,6 @@ def test_integration_of_the_right_hand_side_gives_the_closed_form():
 
 
 @pytest.mark.parametrize("value", [0.0, -1e-3, np.nan, np.inf])
-def test_impossible_mean_motion_is_rejected_by_name(value):
-    with pytest.raises(ConfigurationError, match="mean_motion"):
+def test_invalid_mean_motion_is_rejected_by_name(value):
+    with pytest.raises(OrbitError, match="mean_motion"):
         HillModel(value)

@@ -1,4 +1,4 @@
-"""Roberts' time-varying model against the gradient of J2, and the averaged model that it tends to."""
+"""Roberts' time-varying model against the gradient of J2 and the averaged model."""
 
 import math
 
@@ -48,7 +48,7 @@ def test_gradient_is_the_derivative_of_the_acceleration(radius, inclination, lat
 
 
 @given(references, latitudes)
-def test_gradient_is_symmetric_and_without_trace(reference, latitude):
+def test_gradient_is_symmetric_and_traceless(reference, latitude):
     gradient = circular_gradient(reference, latitude)
     np.testing.assert_array_equal(gradient, gradient.T)
     assert abs(np.trace(gradient)) < 1e-14 * reference.oblateness * 100
@@ -65,7 +65,7 @@ def test_average_over_an_orbit_is_the_averaged_model(reference):
 
 
 @given(references, st.floats(0.0, 1e4))
-def test_model_is_periodic_with_the_node(reference, time):
+def test_model_is_periodic_with_the_nodal_period(reference, time):
     model = J2GradientModel(reference)
     n = reference.mean_motion
     np.testing.assert_allclose(model.dynamics(time), model.dynamics(time + model.period), atol=1e-11 * n)
@@ -79,12 +79,12 @@ def test_transition_has_unit_determinant(reference, time, turns):
     assert abs(np.linalg.det(phi) - 1.0) < 1e-8
 
 
-def test_no_start_stays_bounded_in_this_model():
-    # Its Floquet multipliers leave the unit circle: a finding, not an accident of the integration.
+def test_no_motion_is_bounded_in_this_model():
+    # The Floquet multipliers are off the unit circle.
     model = J2GradientModel(CircularReference(7e6, math.radians(97.87)))
     multipliers = np.linalg.eigvals(model.transition(0.0, model.period))
     assert np.abs(multipliers).max() > 1.01
     assert math.isclose(float(np.prod(multipliers).real), 1.0, abs_tol=1e-8)
-    # Coming back after the first revolution is what `bounded` means here.
+    # `bounded` here: the along-track position repeats after the first revolution.
     start = model.bounded(0.0, np.array([100.0, 200.0, -50.0, 0.1, -0.2, 0.05]))
     assert math.isclose(model.propagate(0.0, start, model.period)[1], 200.0, abs_tol=1e-9)

@@ -1,4 +1,4 @@
-"""The compiled equations of motion against the models that they belong to."""
+"""Compiled equations of motion against the models."""
 
 import math
 
@@ -29,7 +29,7 @@ MODELS = {
     time=st.floats(0.0, 1e4),
     thrust=st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3),
 )
-def test_rate_and_jacobian_are_those_of_the_model(name, direction, size, time, thrust):
+def test_compiled_rate_and_jacobian_equal_the_models(name, direction, size, time, thrust):
     model = MODELS[name]
     state = 10.0**size * np.array(direction) * np.repeat([1.0, 1e-3], 3)
     rate, jacobian = model.motion(time, state, np.array(thrust))
@@ -41,7 +41,7 @@ def test_rate_and_jacobian_are_those_of_the_model(name, direction, size, time, t
     np.testing.assert_allclose(jacobian, model.dynamics(time, state), rtol=1e-12, atol=1e-19)
 
 
-def test_close_to_the_chief_no_digit_of_gravity_is_lost():
+def test_gravity_close_to_the_chief_has_full_precision():
     model, state = MODELS["point mass"], 1e-6 * np.ones(6)
     expected = model.derivative(0.0, state)
     assert math.isclose(model.motion(0.0, state)[0][3], expected[3], rel_tol=1e-14)

@@ -1,4 +1,4 @@
-"""What holds for every relative-motion model behind the one interface."""
+"""Properties of every relative-motion model."""
 
 import math
 
@@ -30,7 +30,7 @@ every_model = pytest.mark.parametrize("model", MODELS, ids=lambda model: type(mo
 
 
 @every_model
-def test_right_hand_side_is_the_matrix_where_the_model_is_linear(model: RelativeModel):
+def test_right_hand_side_of_linear_models_is_the_matrix(model: RelativeModel):
     rate = model.derivative(50.0, STATE, THRUST)
     linear = model.dynamics(50.0, STATE) @ STATE + INPUT @ THRUST
     if model.is_linear:
@@ -42,7 +42,7 @@ def test_right_hand_side_is_the_matrix_where_the_model_is_linear(model: Relative
 
 
 @every_model
-def test_held_acceleration_is_discretised_as_it_is_propagated(model: RelativeModel):
+def test_discretisation_equals_propagation_under_held_acceleration(model: RelativeModel):
     tick, time = 60.0, 100.0
     phi, gamma = model.discretise(time, tick, STATE)
     moved, free = model.propagate(time, STATE, tick, THRUST), model.propagate(time, STATE, tick)
@@ -50,7 +50,7 @@ def test_held_acceleration_is_discretised_as_it_is_propagated(model: RelativeMod
     # The Gim-Alfriend matrix is a theory of first order in J2: 1e-6 of 2 km.
     tolerance = 3e-3 if isinstance(model, GimAlfriendModel) else 1e-9
     np.testing.assert_allclose(moved / UNIT, exact / UNIT, atol=tolerance)
-    # The thrust moves the deputy by half a metre, over which gravity's second order is nothing.
+    # The thrust moves the deputy by half a metre, where gravity's second order is negligible.
     np.testing.assert_allclose((moved - free - gamma @ THRUST) / UNIT, 0.0, atol=1e-7)
     for column, step in zip(phi.T, np.diag(10.0 * UNIT), strict=True):
         ahead = model.propagate(time, STATE + step, tick)
@@ -60,14 +60,14 @@ def test_held_acceleration_is_discretised_as_it_is_propagated(model: RelativeMod
 
 
 @every_model
-def test_time_invariant_models_say_so(model: RelativeModel):
+def test_time_invariant_models_are_marked(model: RelativeModel):
     early, late = model.transition(0.0, 500.0), model.transition(1234.5, 500.0)
     same = np.allclose(early / UNIT[:, None], late / UNIT[:, None], rtol=1e-12, atol=1e-12)
     assert same is model.is_time_invariant
 
 
 @every_model
-def test_backwards_undoes_forwards(model: RelativeModel):
+def test_propagation_is_reversible(model: RelativeModel):
     there = model.propagate(100.0, STATE, 900.0)
     back = model.propagate(1000.0, there, -900.0)
     tolerance = 3e-2 if isinstance(model, GimAlfriendModel) else 1e-7
@@ -86,8 +86,8 @@ def test_bounded_start_changes_only_the_along_track_rate(model: RelativeModel):
     other = start + np.array([0, 0, 0, 0, 0.01, 0])
     drift_of_start = drift(start)
     assert abs(drift(other) - drift_of_start) == pytest.approx(0.03 * model.period, rel=0.3)
-    # Where J2 turns the perigee of the relative orbit, it does not come back to the same place after one
-    # revolution, by some thousandths of 2 km; its mean position stays (test_oblate.py).
+    # Where J2 rotates the perigee of the relative orbit, the position after one revolution differs by some
+    # thousandths of 2 km; the mean position does not (test_oblate.py).
     turns = isinstance(model, SchweighartSedwickNodalModel | GimAlfriendModel) or (
         isinstance(model, OblateModel) and isinstance(model.chief, OblateChief)
     )
@@ -95,7 +95,7 @@ def test_bounded_start_changes_only_the_along_track_rate(model: RelativeModel):
 
 
 @every_model
-def test_what_is_on_the_chief_stays_there(model: RelativeModel):
+def test_zero_state_stays_zero(model: RelativeModel):
     np.testing.assert_array_equal(model.propagate(0.0, np.zeros(6), 3000.0), np.zeros(6))
 
 

@@ -1,4 +1,4 @@
-"""Differential J2 against two integrated inertial orbits, its Jacobian, and bounded motion."""
+"""Differential J2: against two integrated inertial orbits, its Jacobian, and bounded motion."""
 
 import math
 
@@ -52,7 +52,7 @@ def inertial(state, duration):
     return solution.y[:, -1]
 
 
-def test_attraction_of_these_tests_is_the_gradient_of_the_potential():
+def test_reference_acceleration_is_the_gradient_of_the_potential():
     place = np.array([5e6, -3e6, 4e6])
     gradient = [(potential(place + d) - potential(place - d)) / 200.0 for d in 100.0 * np.eye(3)]
     np.testing.assert_allclose(attraction(place), gradient, rtol=1e-8)
@@ -93,7 +93,7 @@ def test_jacobian_is_the_derivative(elements, state, time):
 
 @settings(max_examples=10, deadline=None)
 @given(orbits, st.floats(0.0, 3e4), st.floats(-2e4, 2e4))
-def test_chief_is_the_same_whatever_was_asked_before(elements, first, second):
+def test_oblate_chief_does_not_depend_on_earlier_calls(elements, first, second):
     once = OblateChief(elements).inertial(first).copy()
     other = OblateChief(Elements(elements.semi_major_axis * (1 + 1e-12), *list(vars(elements).values())[1:]))
     other.inertial(second)
@@ -102,7 +102,7 @@ def test_chief_is_the_same_whatever_was_asked_before(elements, first, second):
     np.testing.assert_array_equal(OblateChief(elements).inertial(first), once)
 
 
-def test_chief_moves_as_scipy_moves_it():
+def test_oblate_chief_agrees_with_scipy():
     elements = Elements(8e6, 0.1, 1.0, 0.3, 0.4, 0.5)
     chief = OblateChief(elements)
     for time in (-3000.0, 20000.0):
@@ -111,7 +111,7 @@ def test_chief_moves_as_scipy_moves_it():
 
 
 @pytest.mark.parametrize("inclination", [0.0, 0.3, 1.7, math.pi])
-def test_after_a_nodal_period_the_latitude_is_the_same(inclination):
+def test_latitude_repeats_after_a_nodal_period(inclination):
     elements = Elements(7.2e6, 0.001, inclination, 0.2, 0.4, 0.5)
     period = OblateChief(elements).period
     start, after = state_from_elements(elements), inertial(state_from_elements(elements), period)
@@ -125,7 +125,7 @@ def test_after_a_nodal_period_the_latitude_is_the_same(inclination):
         assert math.remainder(latitude - 0.9, math.tau) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_bounded_motion_stays_where_that_of_two_bodies_drifts_away():
+def test_bounded_motion_does_not_drift_where_the_two_body_one_does():
     elements = Elements(7.2e6, 0.01, 0.9, 0.3, 0.4, 0.5)
     model = OblateModel(OblateChief(elements))
     state = np.array([100.0, 200.0, -50.0, 0.1, -0.2, 0.05])
@@ -138,7 +138,7 @@ def test_bounded_motion_stays_where_that_of_two_bodies_drifts_away():
         along = [s[1] for s in states]
         return np.mean(along[16:32]) - np.mean(along[:16])
 
-    # The theory is of first order: of the 200 m, J2^2 and the eccentricity times J2 leave millimetres.
+    # First-order theory: terms of order J2^2 and e J2 of the 200 m, which are millimetres.
     assert abs(drift(model.bounded(0.0, state))) < 0.01
     two_bodies = NonlinearModel(KeplerChief.of(elements)).bounded(0.0, state)
     assert abs(drift(two_bodies)) > 0.5

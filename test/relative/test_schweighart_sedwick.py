@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import OrbitError
 from formation_gnc.orbit.constants import EARTH_RADIUS, J2, MU
 from formation_gnc.orbit.elements import elements_from_state
 from formation_gnc.relative.chief import OblateChief
@@ -33,7 +33,7 @@ def scaled(reference, matrix):
 
 
 @given(references)
-def test_state_matrix_is_the_average_of_the_gradient(reference):
+def test_dynamics_has_the_averaged_gradient(reference):
     n, c2 = reference.mean_motion, 1.0 + reference.averaged
     average = np.zeros((3, 3))
     for row in range(3):
@@ -50,7 +50,7 @@ def test_state_matrix_is_the_average_of_the_gradient(reference):
 
 
 @given(references)
-def test_averaged_acceleration_is_radial_and_sets_the_rate(reference):
+def test_averaged_acceleration_is_radial_and_sets_the_orbital_rate(reference):
     # Roberts (13), (15): n^2 c^2 r balances gravity and the averaged J2 acceleration.
     r, i = reference.radius, reference.inclination
     radial = quad(lambda u: 1.0 - 3.0 * (math.sin(i) * math.sin(u)) ** 2, 0.0, math.tau)[0] / math.tau
@@ -59,7 +59,7 @@ def test_averaged_acceleration_is_radial_and_sets_the_rate(reference):
 
 
 @pytest.mark.parametrize("kind", [SchweighartSedwickModel, SchweighartSedwickNodalModel])
-# Shorter than a microsecond, no number has digits enough left for a comparison.
+# Below a microsecond, rounding leaves too few digits for a comparison.
 @given(
     reference=references,
     start=st.floats(-1.0, 1.0),
@@ -94,7 +94,7 @@ def test_transition_is_a_group_of_unit_determinant(reference, first, second):
 
 
 @given(references, numbers)
-def test_initial_conditions_leave_no_drift_and_no_offset(reference, values):
+def test_centred_state_has_no_drift_and_no_offset(reference, values):
     model = SchweighartSedwickModel(reference)
     unit = np.repeat([1.0, reference.mean_motion], 3)
     state = np.array(values) * unit
@@ -111,7 +111,7 @@ def test_initial_conditions_leave_no_drift_and_no_offset(reference, values):
 
 @settings(max_examples=10, deadline=None)
 @given(st.floats(6.6e6, 4.2e7), st.floats(0.05, math.pi - 0.05), numbers)
-def test_on_the_equator_a_perturbed_satellite_keeps_about_the_reference(radius, inclination, values):
+def test_perturbed_satellite_from_the_equator_stays_by_the_reference(radius, inclination, values):
     # Roberts (28)-(30) and the averaged gradient with the J2 forces of (35) left unaveraged.
     reference = CircularReference(radius, inclination)
     model = SchweighartSedwickModel(reference)
@@ -132,7 +132,7 @@ def test_on_the_equator_a_perturbed_satellite_keeps_about_the_reference(radius, 
         np.mean(solution.sol(start * turn + np.linspace(0.0, 4 * turn, 400, endpoint=False))[:2], axis=1)
         for start in (0, 36)
     ]
-    # One part in a hundred of what starts: the averages run over two orbits, not over a common period.
+    # One part in a hundred of the initial offset: averages are over two orbits, not a common period.
     size = np.abs(state[:2]).max() + strength / reference.mean_motion**2
     assert abs(means[1][1] - means[0][1]) < 0.03 * size
     assert abs(means[0][1]) < 0.03 * size
@@ -173,13 +173,13 @@ def test_cross_track_extension_equals_that_of_schweighart_and_sedwick():
     theirs = (growth * times + m) * np.sin(q * times + phi)
     averaged = SchweighartSedwickModel(reference).propagate(0.0, state, times)[:, 2]
     error, without = np.abs(ours - theirs).max(), np.abs(averaged - theirs).max()
-    # Theirs turns and stretches the line of intersection to first order in time, here over 20 orbits.
+    # Theirs is of first order in time, here over 20 orbits.
     assert error < 0.002 * abs(m)
     assert without > 20.0 * error
 
 
 @pytest.mark.parametrize("inclination", [35.0, 97.87])
-def test_cross_track_extension_is_closer_to_the_truth_than_the_average(inclination):
+def test_cross_track_extension_improves_on_the_average(inclination):
     reference = CircularReference(7e6, math.radians(inclination))
     model = SchweighartSedwickNodalModel(reference)
     start = model.in_plane.on_the_equator(np.zeros(6))
@@ -200,7 +200,7 @@ def test_cross_track_extension_is_closer_to_the_truth_than_the_average(inclinati
     assert without > 10.0 * ours
 
 
-def test_without_oblateness_it_would_be_hills_model():
+def test_model_far_out_tends_to_hills():
     # s scales as r^-2: far out the difference from Hill's equations falls by four at twice the radius.
     differences = []
     for radius in (4e7, 8e7):
@@ -212,13 +212,13 @@ def test_without_oblateness_it_would_be_hills_model():
 
 
 @pytest.mark.parametrize("inclination", [0.0, math.pi / 2])
-def test_cross_track_extension_has_no_singular_inclination_or_state(inclination):
+def test_cross_track_extension_is_regular_at_any_inclination_and_state(inclination):
     model = SchweighartSedwickNodalModel(CircularReference(7e6, inclination))
     assert np.isfinite(model.transition(0.0, 1e4)).all()
     np.testing.assert_array_equal(model.propagate(0.0, np.zeros(6), 1e4), np.zeros(6))
 
 
 @pytest.mark.parametrize(("radius", "inclination"), [(6e6, 1.0), (math.nan, 1.0), (7e6, math.inf)])
-def test_impossible_reference_is_rejected_by_name(radius, inclination):
-    with pytest.raises(ConfigurationError, match=r"radius|inclination"):
+def test_invalid_reference_is_rejected_by_name(radius, inclination):
+    with pytest.raises(OrbitError, match=r"radius|inclination"):
         CircularReference(radius, inclination)

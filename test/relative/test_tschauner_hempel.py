@@ -63,7 +63,7 @@ def test_transition_is_symplectic(model, start, turns):
 
 
 @given(st.floats(6.6e6, 4.2e7), st.floats(0.0, 6.28), fractions)
-def test_circular_chief_gives_hills_equations(radius, anomaly, turns):
+def test_model_about_a_circular_chief_is_hills(radius, anomaly, turns):
     model = TschaunerHempelModel(KeplerChief(radius, 0.0, true_anomaly=anomaly))
     hill = HillModel(model.chief.mean_motion)
     duration = turns * model.period
@@ -83,13 +83,13 @@ def test_bounded_motion_closes_after_one_revolution(model, start, numbers):
     np.testing.assert_allclose(after / unit, state / unit, atol=1e-10 * size + 1e-12)
 
 
-def test_bounded_condition_is_the_one_every_model_shares():
+def test_bounded_condition_is_the_default_one():
     model = TschaunerHempelModel(KeplerChief(9e6, 0.3, true_anomaly=1.0))
     state = np.array([100.0, 200.0, -50.0, 0.1, -0.2, 0.05])
     np.testing.assert_allclose(model.bounded(77.0, state), RelativeModel.bounded(model, 77.0, state), rtol=1e-10)
 
 
-def test_bounded_rate_at_the_perigee_is_the_known_one():
+def test_bounded_rate_at_the_perigee_is_the_published_one():
     # Inalhan, Tillerson and How (2002): y' / x = -n (2 + e) / sqrt((1 + e) (1 - e)^3) at perigee.
     e = 0.3
     model = TschaunerHempelModel(KeplerChief(9e6, e))

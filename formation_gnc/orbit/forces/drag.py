@@ -1,4 +1,4 @@
-"""Drag in an atmosphere that turns with the Earth and thins out exponentially, band by band."""
+"""Drag in a co-rotating atmosphere, exponential in each band of altitude."""
 
 from math import exp, sqrt
 
@@ -10,7 +10,7 @@ from formation_gnc.orbit.jit import inline
 from formation_gnc.parameters import parameter
 
 FLATTENING = 1.0 / 298.257223563
-"""Of the surface from which altitude is counted (WGS 84)."""
+"""Flattening of the reference surface of altitude (WGS 84)."""
 
 # Base altitude, km; density there, kg/m^3; scale height, km. Vallado, Fundamentals of Astrodynamics, 8-4:
 # US Standard Atmosphere to 25 km, CIRA-72 to 500 km, CIRA-72 with an exospheric temperature of 1000 K above.
@@ -51,9 +51,9 @@ _BASE, _DENSITY, _SCALE = _BANDS[:, 0] * 1e3, _BANDS[:, 1].copy(), _BANDS[:, 2] 
 
 @inline
 def density(x: float, y: float, z: float) -> float:
-    """Density of the air, kg/m^3, at an inertial position, m.
+    """Density of the atmosphere, kg/m^3, at an inertial position, m.
 
-    Altitude is counted along the radius from the ellipsoid, which is within 100 m of the geodetic one in LEO.
+    Altitude is along the radius from the ellipsoid, within 100 m of the geodetic altitude in LEO.
     """
     r = sqrt(x * x + y * y + z * z)
     sine = z / r
@@ -61,8 +61,8 @@ def density(x: float, y: float, z: float) -> float:
     band = 0
     while band + 1 < len(_BASE) and altitude >= _BASE[band + 1]:
         band += 1
-    thinned: float = _DENSITY[band] * exp((_BASE[band] - altitude) / _SCALE[band])
-    return thinned
+    result: float = _DENSITY[band] * exp((_BASE[band] - altitude) / _SCALE[band])
+    return result
 
 
 @inline

@@ -1,8 +1,8 @@
 """The Earth's gravity field in spherical harmonics, after Cunningham (Montenbruck and Gill, section 3.2).
 
 With V_nm and W_nm the solid harmonics of a point, the potential is ``mu / R sum (C_nm V_nm + S_nm W_nm)``.
-Derivatives of solid harmonics are solid harmonics one degree up, so every component of the acceleration is
-such a sum as well, and its coefficients are worked out here, once. No place is singular, the poles included.
+Derivatives of solid harmonics are solid harmonics one degree up, so every component of the acceleration is such a
+sum too, with coefficients that are computed once, at import. There is no singularity, at the poles either.
 """
 
 from math import factorial, sqrt
@@ -47,9 +47,9 @@ for _n in range(MAXIMUM_DEGREE + 1):
 def acceleration(
     degree: int, cos_turn: float, sin_turn: float, x: float, y: float, z: float
 ) -> tuple[float, float, float]:
-    """Acceleration by the whole field, central term included, up to a degree and order, m/s^2.
+    """Inertial acceleration by the field up to a degree and order, central term included, m/s^2.
 
-    The arguments are inertial, and so is the result; the turn is the Earth's rotation angle.
+    Position is inertial, m; `cos_turn` and `sin_turn` are of the Earth's rotation angle.
     """
     x, y = cos_turn * x + sin_turn * y, cos_turn * y - sin_turn * x
     r2 = x * x + y * y + z * z
@@ -59,7 +59,7 @@ def acceleration(
     v[0, 0], w[0, 0] = EARTH_RADIUS / sqrt(r2), 0.0
     for n in range(1, degree + 2):
         before = n - 1
-        for m in range(n - 1):  # orders do not depend on one another: this loop runs in vector registers
+        for m in range(n - 1):  # orders are independent: this loop is vectorised
             v[n, m] = _AHEAD[n, m] * pz * v[before, m] - _BEHIND[n, m] * square * v[n - 2, m]
             w[n, m] = _AHEAD[n, m] * pz * w[before, m] - _BEHIND[n, m] * square * w[n - 2, m]
         v[n, before] = _AHEAD[n, before] * pz * v[before, before]
@@ -67,7 +67,7 @@ def acceleration(
         v[n, n] = (2 * n - 1) * (px * v[before, before] - py * w[before, before])
         w[n, n] = (2 * n - 1) * (px * w[before, before] + py * v[before, before])
     ax, ay, az = 0.0, 0.0, 0.0
-    for n in range(degree, -1, -1):  # the small terms first
+    for n in range(degree, -1, -1):  # small terms first
         for m in range(n + 2):
             ax += _XV[n, m] * v[n + 1, m] + _XW[n, m] * w[n + 1, m]
             ay += _YV[n, m] * v[n + 1, m] + _YW[n, m] * w[n + 1, m]

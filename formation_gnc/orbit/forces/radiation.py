@@ -1,4 +1,4 @@
-"""Solar radiation pressure on a sphere, and the Earth's shadow that interrupts it."""
+"""Solar radiation pressure on a sphere, with the Earth's shadow."""
 
 from math import acos, asin, pi, sqrt
 
@@ -18,9 +18,9 @@ SUN_RADIUS = 695.7e6
 
 @inline
 def illumination(sx: float, sy: float, sz: float, x: float, y: float, z: float) -> float:
-    """Fraction of the Sun's disc in view: 0 in umbra, 1 in sunlight (Montenbruck and Gill 3.4.2).
+    """Visible fraction of the Sun's disc: 0 in umbra, 1 in sunlight (Montenbruck and Gill 3.4.2).
 
-    Sun at (sx, sy, sz) and satellite at (x, y, z), geocentric, m. The shadow is a cone, the Earth a sphere.
+    Sun at (sx, sy, sz) and satellite at (x, y, z), geocentric, m. Conical shadow of a spherical Earth.
     """
     dx, dy, dz = sx - x, sy - y, sz - z
     distance = sqrt(dx * dx + dy * dy + dz * dz)

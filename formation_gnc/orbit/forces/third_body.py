@@ -1,4 +1,4 @@
-"""Sun and Moon as point masses, less what they do to the Earth itself."""
+"""Third-body attraction of Sun and Moon, as point masses, relative to that of the Earth."""
 
 from formation_gnc.orbit import sky
 from formation_gnc.orbit.forces.force import Floats, Force, Vector3

@@ -1,4 +1,4 @@
-"""The Earth as a body of revolution: point mass and zonal harmonics J2 to J6."""
+"""Gravity of the point mass with zonal harmonics J2 to J6."""
 
 from math import sqrt
 
@@ -13,7 +13,7 @@ _ZONALS = np.array([0.0, 0.0, J2, J3, J4, J5, J6])
 
 @inline
 def acceleration(degree: int, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Acceleration by the point mass and the zonals up to a degree (below 2: none), m/s^2.
+    """Acceleration by the point mass and the zonal harmonics up to a degree (below 2: none), m/s^2.
 
     With s = z/r and P_n Legendre's polynomials, degree n adds
     ``mu J_n R^n / r^(n+2) [P'_(n+1)(s) r_hat - P'_n(s) z_hat]``: the gradient of its potential.

@@ -1,0 +1,77 @@
+"""Parameters of the plant: the run, its forces and its satellites."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from formation_gnc.common import LAST_SECOND, CommonParameters
+from formation_gnc.errors import ParameterError
+from formation_gnc.orbit.forces.force import Body
+from formation_gnc.orbit.forces.model import Forces
+from formation_gnc.parameters import parameter, per_name
+from formation_gnc.plant.sensors import SensorSuite
+from formation_gnc.plant.thrusters import ThrusterParameters
+from formation_gnc.types import NANOSECONDS
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeputyParameters(Body):
+    """One deputy: initial state, body, thrusters and sensors."""
+
+    relative_state: tuple[float, ...] = parameter(
+        unit="m, m/s",
+        length=6,
+        minimum=-1e9,
+        maximum=1e9,
+        doc="true state at the start relative to the chief, Hill frame",
+    )
+    thrusters: ThrusterParameters = ThrusterParameters()
+    sensors: SensorSuite = SensorSuite()
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlantParameters(CommonParameters):
+    """The run and its satellites."""
+
+    seed: int = parameter(1, minimum=0, doc="seed of every random number of the run")
+    duration: float = parameter(unit="s", above=0.0, maximum=LAST_SECOND, doc="simulated time to fly, whole ticks")
+    real_time_factor: float = parameter(
+        0.0, minimum=0.0, doc="simulated seconds per wall second at most; 0 for as fast as possible"
+    )
+    deadline: float = parameter(
+        2.0,
+        unit="s",
+        above=0.0,
+        doc="wall time a deputy has for its answer before it gets no thrust for the tick",
+    )
+    step: float = parameter(
+        10.0, unit="s", above=0.0, doc="longest integration step, of order eight; a longer tick is divided"
+    )
+    forces: Forces = Forces()
+    chief_body: Body = Body()
+    wait_for_recorder: bool = parameter(False, doc="do not start before a recorder listens to everything")
+    deputies: tuple[str, ...] = parameter(("deputy1",), doc="names of the deputies, each a namespace")
+    deputy: dict[str, DeputyParameters] = per_name("deputies")
+
+    def __post_init__(self) -> None:
+        """Check the names of the deputies and the duration.
+
+        Raises:
+            ParameterError: a name that is no namespace or comes twice, or a duration below a tick.
+        """
+        super().__post_init__()
+        if len(set(self.deputies)) != len(self.deputies) or not self.deputies:
+            raise ParameterError(
+                f"parameter deputies: {list(self.deputies)} is not allowed; it must be one or more different names"
+            )
+        for name in self.deputies:
+            if not (name.isidentifier() and name.isascii()):
+                raise ParameterError(
+                    f"parameter deputies: {name!r} is not allowed; a name has letters, digits and _ only"
+                )
+        if round(self.duration * NANOSECONDS) < self.tick_ns:
+            raise ParameterError(f"parameter duration: {self.duration!r} s is not allowed; it must be a tick or more")
+
+    @cached_property
+    def ticks(self) -> int:
+        """Number of ticks that begin within the duration."""
+        return -(-round(self.duration * NANOSECONDS) // self.tick_ns)
