@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from formation_gnc.common import CommonParameters
-from formation_gnc.errors import ConfigurationError, OrbitError
+from formation_gnc.errors import OrbitError
 from formation_gnc.guidance.formation import Formation
 from formation_gnc.orbit.elements import (
     Elements,
@@ -68,7 +68,7 @@ class TargetPath(ABC):
         path = self.states(times)
         try:
             deputy = elements_from_state(inertial_from_relative(inertial, path[0]))
-        except ConfigurationError as reason:
+        except OrbitError as reason:
             raise OrbitError(f"this formation starts on no orbit about the Earth: {reason}") from None
         exact = np.array(
             [relative_from_inertial(_advanced(chief, float(t)), _advanced(deputy, float(t))) for t in times]
