@@ -9,7 +9,7 @@ import numpy as np
 
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
 from formation_gnc.control.registry import ALGORITHMS
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import ParameterError
 from formation_gnc.flight.module import Configuration, FlightModule, ModuleParameters
 from formation_gnc.parameters import parameter, per_entry
 from formation_gnc.records import EventKind, NavigationState, Status, Target, Thrust
@@ -35,10 +35,10 @@ class ControllerParameters(ModuleParameters):
     laws: Mapping[str, Any] = per_entry(ALGORITHMS)
 
     def __post_init__(self) -> None:
-        """Raise ConfigurationError for a thrust limit of zero on every axis."""
+        """Raise ParameterError for a thrust limit of zero on every axis."""
         super().__post_init__()
         if not any(self.thrust_limit):
-            raise ConfigurationError(
+            raise ParameterError(
                 f"parameter thrust_limit: {list(self.thrust_limit)} is not allowed; one axis must push"
             )
 

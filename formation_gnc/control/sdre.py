@@ -81,7 +81,8 @@ class Sdre(Controller[SdreParameters]):
         self._chief = common.chief
         self._integrates = parameters.integrates
         self._integral = [0.0, 0.0, 0.0] if self._integrates else []
-        self._gain: Matrix | DesignError = DesignError("none yet")
+        self._gain: Matrix | None = None
+        self._failure = ""
         self._updated_at: int | None = None
         try:
             r = vehicle.mass**2 * parameters.thrust_matrix()
@@ -126,9 +127,9 @@ class Sdre(Controller[SdreParameters]):
             try:
                 self._gain = self.gain(dynamics)
             except (DesignError, np.linalg.LinAlgError) as failure:
-                self._gain = DesignError(str(failure))
-        if isinstance(self._gain, DesignError):
-            raise self._gain
+                self._gain, self._failure = None, str(failure)
+        if self._gain is None:
+            raise DesignError(self._failure)
         return self._gain
 
     def command(self, estimate: NavigationState, target: Target) -> Command:
