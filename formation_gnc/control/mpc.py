@@ -117,6 +117,7 @@ class ModelPredictiveController(Controller[MpcParameters]):
         """
         self._parameters = parameters
         self._tick_ns, self._step_ns = common.tick_ns, round(parameters.step * NANOSECONDS)
+        self._replan_ns = max(round(parameters.replan_interval * NANOSECONDS), 1)
         self._steps = parameters.control_horizon or parameters.horizon
         self._check_horizons(common)
         self._model = DESIGN_MODELS[parameters.model](common)
@@ -242,17 +243,14 @@ class ModelPredictiveController(Controller[MpcParameters]):
     def command(self, estimate: NavigationState, target: Target) -> Command:
         """The plan's force for this tick: from a new plan when due, else from the plan in force."""
         time, mass_ratio = estimate.time, estimate.mass / self._mass
-        command = self._new_plan(estimate, target) if self._is_due(time) else self._follow(time)
+        due = not len(self.plan) or time - self._planned_at >= self._replan_ns
+        command = self._new_plan(estimate, target) if due else self._follow(time)
         force = command.force
         for constraint in reversed(self._constraints):
             force = constraint.clip(force, time, target)
         if self._rate is not None:
             self._rate.previous = np.clip(np.nan_to_num(force), -self._limit, self._limit)
         return replace(command, force=force * mass_ratio)
-
-    def _is_due(self, time: int) -> bool:
-        interval = max(round(self._parameters.replan_interval * NANOSECONDS), 1)
-        return not len(self.plan) or time - self._planned_at >= interval
 
     def _step_at(self, time: int) -> int:
         return (time - self._planned_at) // self._step_ns

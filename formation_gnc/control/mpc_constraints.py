@@ -17,7 +17,7 @@ from formation_gnc.records import NavigationState, Target
 from formation_gnc.types import NANOSECONDS, Matrix, Vector
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class PlanInputs:
     """Inputs of a plan."""
 
@@ -28,7 +28,7 @@ class PlanInputs:
     """(K, 3) forces of the plan in force, N; K is 0 if there is none."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Bounds:
     """Bounds of a constraint's rows for one plan."""
 

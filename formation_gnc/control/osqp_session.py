@@ -35,7 +35,7 @@ class SolverError(ArithmeticError):
     """No usable solution; the message is OSQP's status, or what is wrong with its solution."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Solution:
     """A solution within the accuracy of the solver."""
 
@@ -121,8 +121,9 @@ class OsqpSession:
         if result.info.status_val != osqp.SolverStatus.OSQP_SOLVED or not np.isfinite(solution).all():
             self.solver.warm_start(x=np.zeros(len(linear)), y=np.zeros(len(bounds.lower)))
             raise SolverError(status)
-        forces = np.clip(solution[: self.count], bounds.lower[: self.count], bounds.upper[: self.count])
-        if np.abs(forces - solution[: self.count]).max() > 100.0 * ACCURACY:
+        exact = solution[: self.count]
+        forces = np.clip(exact, bounds.lower[: self.count], bounds.upper[: self.count])
+        if np.abs(forces - exact).max() > 100.0 * ACCURACY:
             raise SolverError(f"{status}, but outside the thrust limit")
         return Solution(forces.reshape(-1, 3), status, int(result.info.iter), result.info.obj_val)
 
