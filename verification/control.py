@@ -22,7 +22,7 @@ from formation_gnc.control.riccati import Weights, stationary_gain
 from formation_gnc.orbit.constants import MU
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import hill_rotation, inertial_from_relative, relative_from_inertial
-from formation_gnc.orbit.propagation import advance_with_transition
+from formation_gnc.orbit.propagation import propagate_with_transition
 from formation_gnc.records import NavigationState, Target
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.schweighart_sedwick import CircularReference, SchweighartSedwickModel
@@ -65,8 +65,8 @@ def fly(
         force = np.clip(law.command(estimate(time, states[-1], chief, mass), aim).force, -limit, limit)
         forces.append(force)
         thrust = force @ hill_rotation(chief) / mass
-        deputy = advance_with_transition(deputy, thrust, tick, steps)[0]
-        chief = advance_with_transition(chief, np.zeros(3), tick, steps)[0]
+        deputy = propagate_with_transition(deputy, thrust, tick, steps)[0]
+        chief = propagate_with_transition(chief, np.zeros(3), tick, steps)[0]
         states.append(relative_from_inertial(chief, deputy))
     return np.array(states), np.array(forces)
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from formation_gnc.orbit.elements import Elements, elements_from_state
 from formation_gnc.orbit.frames import hill_rotation, inertial_from_relative, relative_from_inertial
-from formation_gnc.orbit.propagation import advance_with_transition
+from formation_gnc.orbit.propagation import propagate_with_transition
 from formation_gnc.relative.chief import KeplerChief, OblateChief
 from formation_gnc.relative.gim_alfriend import GimAlfriendModel
 from formation_gnc.relative.hill import HillModel
@@ -43,7 +43,7 @@ AXES = ("radial", "along-track", "cross-track")
 
 def advance(state: Array, duration: float) -> Array:
     """Inertial state after a duration (s) under point mass and J2."""
-    moved: Array = advance_with_transition(state, NO_THRUST, duration, max(1, math.ceil(duration / 20.0)))[0]
+    moved: Array = propagate_with_transition(state, NO_THRUST, duration, max(1, math.ceil(duration / 20.0)))[0]
     return moved
 
 

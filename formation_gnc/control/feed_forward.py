@@ -5,7 +5,7 @@ from math import ceil
 import numpy as np
 
 from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
-from formation_gnc.orbit.propagation import advance_with_transition
+from formation_gnc.orbit.propagation import propagate_with_transition
 from formation_gnc.records import NavigationState, Target
 from formation_gnc.relative.model import NO_THRUST, RelativeModel
 from formation_gnc.types import NANOSECONDS, Matrix, Vector
@@ -45,8 +45,8 @@ class FeedForward:
         steps = ceil(ahead / MAX_STEP)
         chief, deputy = estimate.chief_state, inertial_from_relative(estimate.chief_state, state)
         return relative_from_inertial(
-            advance_with_transition(chief, NO_THRUST, ahead, steps)[0],
-            advance_with_transition(deputy, NO_THRUST, ahead, steps)[0],
+            propagate_with_transition(chief, NO_THRUST, ahead, steps)[0],
+            propagate_with_transition(deputy, NO_THRUST, ahead, steps)[0],
         )
 
     def _acceleration_per_velocity(self, ahead: float) -> Matrix:

@@ -6,7 +6,7 @@ import numpy as np
 
 from formation_gnc.navigation.process import Interval, substeps
 from formation_gnc.orbit.frames import hill_rotation
-from formation_gnc.orbit.propagation import advance_with_transition
+from formation_gnc.orbit.propagation import propagate_with_transition
 from formation_gnc.types import Matrix, Vector
 
 _NO_ACCELERATION = np.zeros(3)
@@ -40,10 +40,10 @@ class StateHistory:
                 break
             duration = min(age, interval.duration)
             thrust = interval.acceleration @ hill_rotation(interval.chief)
-            deputy, step = advance_with_transition(deputy, thrust, -duration, substeps(duration))
+            deputy, step = propagate_with_transition(deputy, thrust, -duration, substeps(duration))
             transition = step @ transition
             age -= duration
         if age > 0.0:
-            deputy, step = advance_with_transition(deputy, _NO_ACCELERATION, -age, substeps(age))
+            deputy, step = propagate_with_transition(deputy, _NO_ACCELERATION, -age, substeps(age))
             transition = step @ transition
         return deputy, transition

@@ -18,7 +18,7 @@ from formation_gnc.orbit.forces.model import CACHE_KEY, COEFFICIENTS, SETTINGS, 
 from formation_gnc.orbit.forces.radiation import illumination
 from formation_gnc.orbit.frames import inertial_acceleration
 from formation_gnc.orbit.gravity import oblate_acceleration, oblate_gradient
-from formation_gnc.orbit.jit import ANY_MATRIX, ANY_VECTOR, kernel
+from formation_gnc.orbit.jit import ANY_MATRIX, ANY_VECTOR, inline, kernel
 from formation_gnc.orbit.runge_kutta import COUPLING, INSTANT_OF_STAGE, INSTANTS, STAGES, WEIGHTS
 from formation_gnc.orbit.sky import EPHEMERIDES, look_up, sun
 
@@ -30,8 +30,26 @@ _TICK = (float64[:, ::1], ANY_MATRIX, ANY_VECTOR, float64[:, ::1], float64[::1],
 call."""
 
 
+@inline
+def _over_mass(coefficients: Array, masses: Array, satellite: int, out: Array) -> None:
+    """Fill in the coefficients of a satellite over its present mass; without bodies they stay zero."""
+    if len(coefficients) > 0:
+        for force in range(COEFFICIENTS):
+            out[force] = coefficients[satellite, force] / masses[satellite]
+
+
+@inline
+def _first_below_surface(states: Array) -> int:
+    """Index of the first satellite that is not above the Earth's surface, or -1."""
+    for satellite in range(len(states)):
+        x, y, z = states[satellite, 0], states[satellite, 1], states[satellite, 2]
+        if not x * x + y * y + z * z >= EARTH_RADIUS * EARTH_RADIUS:  # NaN included
+            return satellite
+    return -1
+
+
 @kernel(_TICK, CACHE_KEY)
-def _propagate(  # noqa: C901 - one compiled loop nest: calls between kernels cost more than they explain
+def _propagate(
     states: Array,
     thrust: Array,
     masses: Array,
@@ -42,7 +60,7 @@ def _propagate(  # noqa: C901 - one compiled loop nest: calls between kernels co
     tick: float,
     substeps: int,
 ) -> int:
-    """Propagate states by a tick; returns the first satellite that is no longer above the surface, or -1."""
+    """Propagate states by a tick; returns `_first_below_surface`."""
     step = tick / substeps
     coupling, weights = COUPLING.copy(), WEIGHTS.copy()  # constants would be unrolled: seconds to compile
     satellites = states.shape[0]
@@ -56,9 +74,7 @@ def _propagate(  # noqa: C901 - one compiled loop nest: calls between kernels co
         for instant in range(len(INSTANTS)):
             look_up(needed, time + (substep + INSTANTS[instant]) * step, ephemerides[instant])
         for satellite in range(satellites):
-            if len(coefficients) > 0:
-                for force in range(COEFFICIENTS):
-                    per_mass[force] = coefficients[satellite, force] / masses[satellite]
+            _over_mass(coefficients, masses, satellite, per_mass)
             coefficients_ = to_fixed_tuple(per_mass, COEFFICIENTS)
             for i in range(STAGES):
                 for c in range(6):
@@ -77,11 +93,7 @@ def _propagate(  # noqa: C901 - one compiled loop nest: calls between kernels co
                 for i in range(STAGES):
                     change += weights[i] * rates[i, c]
                 states[satellite, c] += step * change
-    for satellite in range(satellites):
-        x, y, z = states[satellite, 0], states[satellite, 1], states[satellite, 2]
-        if not x * x + y * y + z * z >= EARTH_RADIUS * EARTH_RADIUS:
-            return satellite
-    return -1
+    return _first_below_surface(states)
 
 
 @kernel(_TICK, CACHE_KEY)
@@ -111,9 +123,7 @@ def _accelerations(
     look_up(needed, time, ephemerides)
     per_mass, state = np.zeros(COEFFICIENTS), np.empty(6)
     for satellite in range(len(states)):
-        if len(coefficients) > 0:
-            for force in range(COEFFICIENTS):
-                per_mass[force] = coefficients[satellite, force] / masses[satellite]
+        _over_mass(coefficients, masses, satellite, per_mass)
         state[:] = states[satellite]
         out[satellite, 0], out[satellite, 1], out[satellite, 2] = acceleration(
             to_fixed_tuple(settings, SETTINGS),
@@ -247,7 +257,7 @@ class Propagator:
 
 
 @kernel((ANY_VECTOR, ANY_VECTOR, float64, int64))
-def advance_with_transition(state: Array, acceleration: Array, tick: float, substeps: int = 1) -> tuple[Array, Array]:
+def propagate_with_transition(state: Array, acceleration: Array, tick: float, substeps: int = 1) -> tuple[Array, Array]:
     """State and state transition matrix after a tick, under the point mass with J2.
 
     Args:

@@ -21,7 +21,7 @@ from formation_gnc.orbit.elements import (
 )
 from formation_gnc.orbit.frames import hill_rotation
 from formation_gnc.orbit.gravity import acceleration as gravity
-from formation_gnc.orbit.propagation import advance_with_transition
+from formation_gnc.orbit.propagation import propagate_with_transition
 from formation_gnc.relative.model import NO_THRUST, Array
 
 STEPS_PER_TURN = 200
@@ -251,9 +251,9 @@ def _oblate_inertial(chief: OblateChief, time: float) -> Array:
     index = max(math.floor(time / step), 0)
     knots = _knots(chief)
     while len(knots) <= index:
-        knots.append(advance_with_transition(knots[-1], NO_THRUST, step, 1)[0])
+        knots.append(propagate_with_transition(knots[-1], NO_THRUST, step, 1)[0])
     rest = time - index * step
-    state: Array = advance_with_transition(knots[index], NO_THRUST, rest, max(1, math.ceil(abs(rest) / step)))[0]
+    state: Array = propagate_with_transition(knots[index], NO_THRUST, rest, max(1, math.ceil(abs(rest) / step)))[0]
     state.setflags(write=False)
     return state
 

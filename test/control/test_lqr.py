@@ -9,7 +9,7 @@ from formation_gnc.control.lqr import LinearQuadraticRegulator, LqrParameters
 from formation_gnc.errors import DesignError
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
-from formation_gnc.orbit.propagation import advance_with_transition
+from formation_gnc.orbit.propagation import propagate_with_transition
 from formation_gnc.relative.chief import KeplerChief
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.tschauner_hempel import TschaunerHempelModel
@@ -154,8 +154,8 @@ def test_nonlinear_feed_forward_includes_j2_and_curvature(common, vehicle, estim
             axes = np.array([leader[:3] / np.linalg.norm(leader[:3]), np.zeros(3), np.cross(leader[:3], leader[3:])])
             axes[2] /= np.linalg.norm(axes[2])
             axes[1] = np.cross(axes[2], axes[0])
-            follower = advance_with_transition(follower, acceleration @ axes, 10.0, 1)[0]
-            leader = advance_with_transition(leader, np.zeros(3), 10.0, 1)[0]
+            follower = propagate_with_transition(follower, acceleration @ axes, 10.0, 1)[0]
+            leader = propagate_with_transition(leader, np.zeros(3), 10.0, 1)[0]
             state = relative_from_inertial(leader, follower)
             worst = max(worst, np.linalg.norm((state - goal(time + 10.0))[:3]))
         errors[kind] = worst

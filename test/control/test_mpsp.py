@@ -15,7 +15,7 @@ from formation_gnc.control.plan import Plan, Task
 from formation_gnc.control.registry import ALGORITHMS
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import hill_rotation, inertial_from_relative, relative_from_inertial
-from formation_gnc.orbit.propagation import advance_with_transition
+from formation_gnc.orbit.propagation import propagate_with_transition
 from formation_gnc.parameters import load
 from formation_gnc.relative.chief import KeplerChief
 from formation_gnc.relative.hill import HillModel
@@ -50,10 +50,10 @@ def simulate(law, common, estimate, target, error=lambda time: np.zeros(6)):
         # The target is in free motion from GOAL, as in guidance.
         commands.append(law.command(seen, target(relative_from_inertial(chief, goal), time)))
         # In the axes of the tick's middle: axes held over a tick are an error of the plant, removed by replanning.
-        middle = advance_with_transition(chief, np.zeros(3), 5.0, 1)[0]
+        middle = propagate_with_transition(chief, np.zeros(3), 5.0, 1)[0]
         thrust = commands[-1].force @ hill_rotation(middle) / 100.0
-        deputy = advance_with_transition(deputy, thrust, 10.0, 1)[0]
-        chief, goal = (advance_with_transition(each, np.zeros(3), 10.0, 1)[0] for each in (chief, goal))
+        deputy = propagate_with_transition(deputy, thrust, 10.0, 1)[0]
+        chief, goal = (propagate_with_transition(each, np.zeros(3), 10.0, 1)[0] for each in (chief, goal))
         states.append(relative_from_inertial(chief, deputy))
     return np.array(states), relative_from_inertial(chief, goal), commands
 

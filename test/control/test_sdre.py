@@ -16,7 +16,7 @@ from formation_gnc.errors import DesignError
 from formation_gnc.guidance.relative_orbit import RelativeOrbit, RelativeOrbitParameters
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import hill_rotation, inertial_from_relative, relative_from_inertial
-from formation_gnc.orbit.propagation import advance_with_transition
+from formation_gnc.orbit.propagation import propagate_with_transition
 from formation_gnc.relative.chief import KeplerChief
 from formation_gnc.relative.nonlinear import NonlinearModel
 
@@ -35,8 +35,8 @@ def simulate(law, estimate, target, start, goal, ticks, tick=10.0, chief=CHIEF, 
         aim = goal(time) if callable(goal) else goal
         commands.append(law.command(estimate(states[-1], time, chief=leader), target(aim, time)))
         thrust = (commands[-1].force + disturbance) @ hill_rotation(leader) / 100.0
-        leader = advance_with_transition(leader, np.zeros(3), tick, 1)[0]
-        follower = advance_with_transition(follower, thrust, tick, 1)[0]
+        leader = propagate_with_transition(leader, np.zeros(3), tick, 1)[0]
+        follower = propagate_with_transition(follower, thrust, tick, 1)[0]
         states.append(relative_from_inertial(leader, follower))
     return np.array(states), commands
 
@@ -69,7 +69,7 @@ def test_sdre_acquires_and_holds_a_distant_free_orbit(estimate, target):
     goals = []
     for _ in range(401):
         goals.append(relative_from_inertial(leader, deputy))
-        leader, deputy = (advance_with_transition(each, np.zeros(3), 10.0, 1)[0] for each in (leader, deputy))
+        leader, deputy = (propagate_with_transition(each, np.zeros(3), 10.0, 1)[0] for each in (leader, deputy))
     weights = {"position_error": (100.0,) * 3, "velocity_error": (1.0,) * 3, "thrust": (2.0,) * 3}
     law = Sdre(SdreParameters(**weights), CommonParameters(Orbit(1e7, 0.15), tick=10.0), STRONG)
     states, commands = simulate(
@@ -135,7 +135,7 @@ def test_a_reconfiguration_arrives_on_time_and_is_held(law, parameters, estimate
     goals = []
     for _ in range(251):
         goals.append(relative_from_inertial(leader, deputy))
-        leader, deputy = (advance_with_transition(each, np.zeros(3), 10.0, 1)[0] for each in (leader, deputy))
+        leader, deputy = (propagate_with_transition(each, np.zeros(3), 10.0, 1)[0] for each in (leader, deputy))
     controller = law(parameters(final_time=2000.0, last_plan=60.0, replan_interval=60.0, **WEIGHTS), common, STRONG)
     states, commands = simulate(controller, estimate, target, start, lambda time: goals[round(time / 10.0)], 250)
     assert not any(command.fallback for command in commands)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from formation_gnc.guidance.guidance import Guidance
 from formation_gnc.orbit.elements import Elements, state_from_elements
-from formation_gnc.orbit.propagation import advance_with_transition
+from formation_gnc.orbit.propagation import propagate_with_transition
 from formation_gnc.records import NavigationState
 from formation_gnc.types import NANOSECONDS
 
@@ -33,7 +33,7 @@ def test_target_has_the_coming_eclipses_until_they_are_over(build_guidance: Buil
 
     def eclipse_at(share: float) -> Array:
         seconds = share * revolution
-        state = advance_with_transition(CHIEF, np.zeros(3), seconds, 200)[0] if seconds else CHIEF
+        state = propagate_with_transition(CHIEF, np.zeros(3), seconds, 200)[0] if seconds else CHIEF
         return eclipse_of(guidance, seconds, state)
 
     first = eclipse_at(0.0)

@@ -13,7 +13,7 @@ from formation_gnc.guidance.registry import FORMATIONS
 from formation_gnc.guidance.targets import TARGET_MODELS, TargetPath
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
-from formation_gnc.orbit.propagation import advance_with_transition
+from formation_gnc.orbit.propagation import propagate_with_transition
 
 Array = NDArray[np.float64]
 
@@ -98,7 +98,7 @@ def drift(model: str, about: CommonParameters) -> float:
     deputy, worst = inertial_from_relative(chief, targets[0]), 0.0
     for each in targets:
         worst = max(worst, float(np.linalg.norm((relative_from_inertial(chief, deputy) - each)[:3])))
-        chief, deputy = (advance_with_transition(state, np.zeros(3), step, 20)[0] for state in (chief, deputy))
+        chief, deputy = (propagate_with_transition(state, np.zeros(3), step, 20)[0] for state in (chief, deputy))
     return worst
 
 

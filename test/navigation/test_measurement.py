@@ -20,7 +20,7 @@ from formation_gnc.orbit.frames import (
     inertial_from_relative,
     relative_from_inertial,
 )
-from formation_gnc.orbit.propagation import advance_with_transition
+from formation_gnc.orbit.propagation import propagate_with_transition
 from formation_gnc.sensors.kernels import measure
 from formation_gnc.sensors.registry import sensors
 from formation_gnc.types import Vector
@@ -95,7 +95,7 @@ def test_predictions_are_the_inertial_motion_of_both_satellites(
     interval = Interval(chief, later, acceleration, tick, 1)
     state, predicted, transition = NonlinearProcess().predict(interval, relative, covariance, noise)
     inertial = acceleration @ np.array([hill_transform(chief)[row, :3] for row in range(3)])
-    deputy, step = advance_with_transition(inertial_from_relative(chief, relative), inertial, tick, 1)
+    deputy, step = propagate_with_transition(inertial_from_relative(chief, relative), inertial, tick, 1)
     np.testing.assert_allclose(state, relative_from_inertial(later, deputy), rtol=1e-13, atol=5e-8)
     np.testing.assert_allclose(
         transition, hill_transform(later) @ step @ hill_transform_inverse(chief), rtol=1e-12, atol=1e-13

@@ -7,7 +7,7 @@ from formation_gnc.common import CommonParameters, Orbit
 from formation_gnc.navigation.process import PROCESS_MODELS, Interval
 from formation_gnc.orbit.elements import state_from_elements
 from formation_gnc.orbit.frames import hill_rotation, inertial_from_relative, relative_from_inertial
-from formation_gnc.orbit.propagation import advance_with_transition
+from formation_gnc.orbit.propagation import propagate_with_transition
 
 COMMON = CommonParameters(Orbit(7.2e6, 1e-4, 1.2, 0.1, 0.2, 0.3))
 STATE = np.array([100.0, -200.0, 50.0, 0.01, -0.2, 0.02])
@@ -22,8 +22,8 @@ def test_names_that_scenarios_give_are_offered():
 def test_every_process_model_predicts_a_near_circular_orbit(name: str):
     chief = state_from_elements(COMMON.chief_elements)
     deputy, thrust = inertial_from_relative(chief, STATE), THRUST @ hill_rotation(chief)
-    next_chief = advance_with_transition(chief, np.zeros(3), 10.0, 1)[0]
-    truth = relative_from_inertial(next_chief, advance_with_transition(deputy, thrust, 10.0, 1)[0])
+    next_chief = propagate_with_transition(chief, np.zeros(3), 10.0, 1)[0]
+    truth = relative_from_inertial(next_chief, propagate_with_transition(deputy, thrust, 10.0, 1)[0])
     interval = Interval(chief, next_chief, THRUST, 10.0, 1)
     process = PROCESS_MODELS[name](COMMON)
     state, covariance, transition = process.predict(interval, STATE, np.eye(6), np.zeros((6, 6)))

@@ -9,7 +9,7 @@ from formation_gnc.orbit.constants import EARTH_RADIUS, J2, MU
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import inertial_acceleration
 from formation_gnc.orbit.gravity import acceleration, gradient
-from formation_gnc.orbit.propagation import Propagator, advance_with_transition
+from formation_gnc.orbit.propagation import Propagator, propagate_with_transition
 
 LEO = Elements(6978.1e3, 0.001, np.radians(85.0), 0.3, 0.2, 0.1)
 ECCENTRIC = Elements(2e7, 0.6, np.radians(50.0), 0.3, 0.2, 0.1)
@@ -126,12 +126,12 @@ def test_gradient_is_the_derivative_of_acceleration():
 
 def test_transition_is_symplectic_and_the_derivative_of_the_state():
     state, thrust = state_from_elements(LEO), np.array([1e-4, 0.0, -1e-4])
-    end, transition = advance_with_transition(state, thrust, 60.0, 4)
+    end, transition = propagate_with_transition(state, thrust, 60.0, 4)
     assert end == pytest.approx(Propagator(60.0, substeps=4).propagate(0.0, state[None], thrust[None])[0], abs=0.0)
     for column, step in enumerate([1.0] * 3 + [1e-3] * 3):
         change = step * np.eye(6)[column]
-        ahead, _ = advance_with_transition(state + change, thrust, 60.0, 4)
-        behind, _ = advance_with_transition(state - change, thrust, 60.0, 4)
+        ahead, _ = propagate_with_transition(state + change, thrust, 60.0, 4)
+        behind, _ = propagate_with_transition(state - change, thrust, 60.0, 4)
         # Rounding of positions, 1e-9 m, and velocities, 1e-12 m/s, over the step.
         tolerance = np.array([1e-9] * 3 + [1e-12] * 3) * 4 / step
         assert np.all(np.abs((ahead - behind) / (2 * step) - transition[:, column]) < tolerance)

@@ -11,7 +11,7 @@ from formation_gnc.errors import OrbitError
 from formation_gnc.orbit.constants import EARTH_RADIUS, J2
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import hill_transform, hill_transform_inverse, relative_from_inertial
-from formation_gnc.orbit.propagation import advance_with_transition
+from formation_gnc.orbit.propagation import propagate_with_transition
 from formation_gnc.relative.chief import KeplerChief
 from formation_gnc.relative.gim_alfriend import GimAlfriendModel, sigma
 from formation_gnc.relative.model import RelativeModel
@@ -70,7 +70,7 @@ def test_transition_solves_the_variational_equations(elements, turns):
     duration = turns * model.period
     chief = model.chief.inertial(0.0)
     steps = max(1, math.ceil(duration / model.longest_step))
-    later, inertial = advance_with_transition(chief, np.zeros(3), duration, steps)
+    later, inertial = propagate_with_transition(chief, np.zeros(3), duration, steps)
     exact = scaled(elements, hill_transform(later) @ inertial @ hill_transform_inverse(chief))
     strength = J2 * (EARTH_RADIUS / elements.perigee_radius) ** 2
     ours = scaled(elements, model.transition(0.0, duration))

@@ -16,7 +16,7 @@ from formation_gnc.guidance.targets import TARGET_MODELS
 from formation_gnc.navigation.process import PROCESS_MODELS
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
-from formation_gnc.orbit.propagation import advance_with_transition
+from formation_gnc.orbit.propagation import propagate_with_transition
 from formation_gnc.relative.model import NO_THRUST, LinearModel, integrate
 from formation_gnc.relative.registry import MODELS
 from formation_gnc.sil.runner import Run
@@ -62,7 +62,7 @@ def test_closed_form_transitions_are_the_integrated_ones(name: str):
 def test_exact_models_are_the_difference_of_two_orbits_under_j2(name: str):
     chief = state_from_elements(CHIEF)
     deputy = inertial_from_relative(chief, STATE)
-    chief, deputy = (advance_with_transition(each, NO_THRUST, 3000.0, 100)[0] for each in (chief, deputy))
+    chief, deputy = (propagate_with_transition(each, NO_THRUST, 3000.0, 100)[0] for each in (chief, deputy))
     error = about(name).propagate(0.0, STATE, 3000.0) - relative_from_inertial(chief, deputy)
     assert (np.linalg.norm(error[:3]) < 1e-6) == MODELS[name].is_exact_under_j2
 

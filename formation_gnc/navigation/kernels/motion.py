@@ -9,7 +9,7 @@ from formation_gnc.navigation.kernels.linear_algebra import WRITABLE_MATRIX, WRI
 from formation_gnc.orbit.frames import hill_frame, to_inertial, to_relative
 from formation_gnc.orbit.gravity import oblate_acceleration
 from formation_gnc.orbit.jit import ANY_MATRIX, ANY_VECTOR, inline, kernel
-from formation_gnc.orbit.propagation import advance_with_transition
+from formation_gnc.orbit.propagation import propagate_with_transition
 from formation_gnc.orbit.runge_kutta import COUPLING, STAGES, WEIGHTS
 from formation_gnc.types import Matrix, Vector
 
@@ -42,7 +42,7 @@ def hill_transform_inverse(axes: Matrix, rate: float) -> Matrix:
 
 @inline
 def _coast(state: Vector, ax: float, ay: float, az: float, duration: float, substeps: int) -> Vector:
-    """`advance_with_transition` without the transition."""
+    """`propagate_with_transition` without the transition."""
     step = duration / substeps
     now = state.copy()
     rates = np.empty((STAGES, 6))
@@ -136,7 +136,7 @@ def predict(
     """
     axes, rate = hill_frame(chief)
     thrust = _inertial(axes, acceleration)
-    deputy, inertial = advance_with_transition(to_inertial(axes, rate, chief, state), thrust, duration, substeps)
+    deputy, inertial = propagate_with_transition(to_inertial(axes, rate, chief, state), thrust, duration, substeps)
     next_axes, next_rate = hill_frame(next_chief)
     relative = product(product(hill_transform(next_axes, next_rate), inertial), hill_transform_inverse(axes, rate))
     transition[:] = relative

@@ -1,4 +1,4 @@
-"""What a force on a satellite declares."""
+"""Declaration of a force, and the body that it acts on."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Force:
-    """One force besides the Earth's gravity and thrust, as the registry lists it.
+    """A force besides the Earth's gravity and thrust: an entry of the registry.
 
     `acceleration` is compiled with `formation_gnc.orbit.jit.inline` and runs in the innermost loop. It is called
     with:

@@ -21,7 +21,6 @@ from formation_gnc.parameters import leaves, parameter
 Array = NDArray[np.float64]
 Sum = Callable[..., Vector3]
 
-
 _GRAVITY_SETTINGS = 2
 """Settings of the gravity field, which come first."""
 
@@ -55,7 +54,7 @@ class Forces:
     )
 
     def settings(self) -> Array:
-        """The fields in order, as the compiled sum takes them.
+        """The fields in order, for the compiled sum.
 
         Raises:
             ConfigurationError: a value out of its range.
@@ -63,14 +62,14 @@ class Forces:
         return np.array([float(leaf.check(getattr(self, leaf.name))) for leaf in leaves(type(self), {})])
 
     def ephemerides(self) -> int:
-        """What the forces in use need of the sky, as `formation_gnc.orbit.sky.look_up` takes it."""
+        """Ephemerides that the forces in use need, as bits for `formation_gnc.orbit.sky.look_up`."""
         needed = EARTH_ROTATION if self.harmonics_degree else 0
         for force in FORCES:
             needed |= force.ephemerides if self._is_on(force) else 0
         return needed
 
     def coefficients(self, bodies: Sequence[Body]) -> Array:
-        """(N, len(FORCES)) property of each body that each force is proportional to.
+        """(N, len(FORCES)) property of each body that each force is proportional to; zero for none.
 
         Raises:
             ConfigurationError: no bodies for a force in use that depends on them, or a value of a body out of
