@@ -48,7 +48,7 @@ def commanded_delta_v(bag: Bag, deputy: str) -> tuple[Vector, Vector]:
     topic = topics.THRUST.of(deputy)
     if topic not in bag.topics or bag.topics[topic].count == 0:
         return np.zeros(0), np.zeros(0)
-    thrust, truth = bag.arrays(topic), bag.arrays(topics.TRUTH.name)
+    thrust, truth = bag.arrays(topic, ("force",)), bag.arrays(topics.TRUTH.name, ("deputies",))
     prefix = f"deputies.{deputies_of(bag).index(deputy)}."
     mass = np.interp(thrust["time"], truth["time"], truth[f"{prefix}mass"])
     tick = float(truth["time"][1] - truth["time"][0]) if len(truth["time"]) > 1 else 0.0

@@ -1,7 +1,7 @@
 """History of one deputy of a recorded run."""
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,13 @@ HOUR = 3600.0
 
 ECLIPSES = 300
 """Eclipses kept at most."""
+
+
+class Handler(NamedTuple):
+    """Takes the next batch of messages of a topic, with the fields that it needs."""
+
+    add: Callable[[Fields], None]
+    fields: tuple[str, ...]
 
 
 class DeputyHistory:
@@ -56,14 +63,14 @@ class DeputyHistory:
         self._timing, self._solver = ThinnedByKey[str](2), Thinned(2)
         self.total_delta_v, self._in_eclipse = 0.0, False
         self.eclipses: list[list[float]] = []
-        self.handlers: dict[str, Callable[[Fields], None]] = {
-            topics.ESTIMATE.name: self._add_estimate,
-            topics.TARGET.name: self._add_target,
-            topics.MEASUREMENT.name: self._readings.add,
-            topics.STATUS.name: self._add_status,
-            topics.TIMING.name: self._add_timing,
+        self.handlers: dict[str, Handler] = {
+            topics.ESTIMATE.name: Handler(self._add_estimate, ("relative_state", "covariance", "innovations")),
+            topics.TARGET.name: Handler(self._add_target, ("relative_state",)),
+            topics.MEASUREMENT.name: Handler(self._readings.add, ("readings",)),
+            topics.STATUS.name: Handler(self._add_status, ("iterations",)),
+            topics.TIMING.name: Handler(self._add_timing, ("node", "compute_time")),
         }
-        """Takes the next batch of messages, by topic."""
+        """By topic, in the deputy's namespace."""
 
     def add_truth(self, batch: Fields) -> None:
         """Take the next batch of truths."""

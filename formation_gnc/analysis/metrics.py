@@ -90,12 +90,13 @@ def trajectory(bag: Bag, deputy: str) -> Trajectory:
     Raises:
         BagError: no truth, or no tick with an estimate and a target of this deputy.
     """
-    truth = bag.arrays(topics.TRUTH.name)
+    truth = bag.arrays(topics.TRUTH.name, ("deputies",))
     index = deputies_of(bag).index(deputy)
     missing = [topic.name for topic in (topics.ESTIMATE, topics.TARGET) if topic.of(deputy) not in bag.topics]
     if missing:
         raise BagError(f"{bag.path}: has no {' and no '.join(missing)} of {deputy}")
-    estimate, target = bag.arrays(topics.ESTIMATE.of(deputy)), bag.arrays(topics.TARGET.of(deputy))
+    estimate = bag.arrays(topics.ESTIMATE.of(deputy), ("relative_state", "covariance", "nis"))
+    target = bag.arrays(topics.TARGET.of(deputy), ("relative_state",))
     stamps = np.intersect1d(np.intersect1d(truth["stamp_ns"], estimate["stamp_ns"]), target["stamp_ns"])
     if not len(stamps):
         raise BagError(f"{bag.path}: no tick with an estimate and a target of {deputy}")

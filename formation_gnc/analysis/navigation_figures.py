@@ -95,9 +95,8 @@ def estimate_history(bag: Bag, deputy: str) -> EstimateHistory:
     """
     estimates = _arrays(bag, deputy)
     used = np.zeros(len(estimates["time"]), dtype=np.int64)
-    for name in estimates:
-        if name.startswith("innovations.") and name.endswith(".rejection"):
-            used += estimates[name] == ""
+    for element in estimates.elements("innovations"):
+        used += estimates[f"{element}.rejection"] == ""
     return EstimateHistory(
         estimates["stamp_ns"],
         estimates["relative_state"],
@@ -109,9 +108,9 @@ def estimate_history(bag: Bag, deputy: str) -> EstimateHistory:
 
 
 def _last_rejections(estimates: Fields) -> dict[str, int]:
-    reasons = {name: estimates[name][-1] for name in estimates if name.endswith(".reason")}
-    counts = {reason: estimates[name.replace(".reason", ".count")][-1] for name, reason in reasons.items()}
-    return {str(reason): int(number) for reason, number in counts.items() if reason is not None}
+    """Number of rejections by reason in the last estimate."""
+    last = {element: estimates[f"{element}.reason"][-1] for element in estimates.elements("rejections")}
+    return {str(last[each]): int(estimates[f"{each}.count"][-1]) for each in last if last[each] is not None}
 
 
 def figures_of_estimates(estimates: EstimateHistory, stamps: Stamps, truth: Matrix) -> NavigationFigures:
@@ -146,7 +145,7 @@ def _arrays(bag: Bag, deputy: str) -> Fields:
     topic = topics.ESTIMATE.of(deputy)
     if topic not in bag.topics or not bag.topics[topic].count:
         raise BagError(f"{bag.path}: has no estimate of {deputy}")
-    return bag.arrays(topic)
+    return bag.arrays(topic, ("relative_state", "covariance", "nis", "innovations", "rejections"))
 
 
 def _truth(bag: Bag, deputy: str) -> tuple[Stamps, Matrix]:
@@ -154,5 +153,5 @@ def _truth(bag: Bag, deputy: str) -> tuple[Stamps, Matrix]:
     names = deputies_of(bag)
     if deputy not in names:
         raise BagError(f"{bag.path}: has no truth of {deputy}; it has {', '.join(names)}")
-    truth = bag.arrays(topics.TRUTH.name)
+    truth = bag.arrays(topics.TRUTH.name, ("deputies",))
     return truth["stamp_ns"], truth[f"deputies.{names.index(deputy)}.relative_state"]

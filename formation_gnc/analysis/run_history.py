@@ -1,12 +1,11 @@
 """History of a recorded run: read once, thinned while it is read, for bags of any length."""
 
 from collections import Counter
-from collections.abc import Callable
 from itertools import combinations, islice
 
 import numpy as np
 
-from formation_gnc.analysis.deputy_history import HOUR, DeputyHistory
+from formation_gnc.analysis.deputy_history import HOUR, DeputyHistory, Handler
 from formation_gnc.analysis.metrics import deputies_of
 from formation_gnc.analysis.separation import Separation, minimum_separation
 from formation_gnc.analysis.thinning import ThinnedByKey, TickSelection
@@ -45,14 +44,15 @@ class RunHistory:
         self.event_counts: Counter[str] = Counter()
         self.nearest: Separation | None = None
         self._distances = ThinnedByKey[tuple[str, str]](2)
-        handlers: dict[str, Callable[[Fields], None]] = {
-            topics.TRUTH.name: self._add_truth,
-            topics.EVENTS.name: self._add_events,
+        handlers = {
+            topics.TRUTH.name: Handler(self._add_truth, ("deputies",)),
+            topics.EVENTS.name: Handler(self._add_events, ("kind", "node", "subject", "detail")),
         }
         for name, deputy in self.deputies.items():
             handlers |= {f"/{name}/{topic}": handler for topic, handler in deputy.handlers.items()}
-        for topic, batch in bag.batches([topic for topic in handlers if topic in bag.topics]):
-            handlers[topic](batch)
+        fields = {topic: handler.fields for topic, handler in handlers.items() if topic in bag.topics}
+        for topic, batch in bag.batches(list(fields), fields=fields):
+            handlers[topic].add(batch)
         for deputy in self.deputies.values():
             deputy.finish(bag.end_ns / 3.6e12)
         self.distances: dict[tuple[str, str], Matrix] = self._distances.rows

@@ -1,9 +1,9 @@
 """Readings and innovations of a recorded run by sensor."""
 
-from itertools import count, takewhile
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from formation_gnc.analysis.thinning import ThinnedByKey
 from formation_gnc.recording.reader import Fields
@@ -41,15 +41,19 @@ class SensorSeries:
     def add(self, batch: Fields) -> None:
         """Take the next batch of messages."""
         found: dict[Channel, list[list[float]]] = {}
-        places = (f"{self._elements}.{place}" for place in count())
-        for place in takewhile(lambda place: f"{place}.sensor" in batch, places):
-            rejections = batch.get(f"{place}.rejection")
-            for row, sensor in enumerate(batch[f"{place}.sensor"]):
-                if sensor is None or (rejections is not None and rejections[row]):
-                    continue
-                time = float(batch["time"][row]) / HOUR
-                values = zip(*(batch[f"{place}.{field}"][row] for field in self._fields), strict=False)
+        for element in batch.elements(self._elements):
+            sensors, times = batch[f"{element}.sensor"], batch["time"] / HOUR
+            columns = [batch[f"{element}.{field}"] for field in self._fields]
+            for row in np.flatnonzero(self._is_shown(batch, element)):
+                values = zip(*(column[row] for column in columns), strict=False)
                 for component, each in enumerate(values):
-                    found.setdefault((str(sensor), component), []).append([time, *map(float, each)])
+                    found.setdefault((str(sensors[row]), component), []).append([times[row], *each])
         for channel, rows in found.items():
             self._series.add(channel, np.array(sorted(rows)))
+
+    def _is_shown(self, batch: Fields, element: str) -> NDArray[np.bool_]:
+        """Rows that have an element of the list, and for innovations use its reading."""
+        if f"{element}.rejection" in batch:
+            used: NDArray[np.bool_] = batch[f"{element}.rejection"] == ""
+            return used
+        return np.array([sensor is not None for sensor in batch[f"{element}.sensor"]])

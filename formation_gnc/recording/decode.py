@@ -1,6 +1,6 @@
 """CDR bytes to arrays and typed messages, by the definition that the bag itself carries."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -67,12 +67,16 @@ class MessageType:
         except (SerdeError, KeyError) as error:
             raise self._misfit(error) from None
 
-    def arrays(self, messages: Sequence[bytes]) -> dict[str, NDArray[Any]]:
+    def arrays(self, messages: Sequence[bytes], fields: Collection[str] | None = None) -> dict[str, NDArray[Any]]:
         """Decode many messages of the type: an array per field, a row per message.
 
         Nested fields are dotted, elements of message and string arrays numbered ("deputies.0.mass");
         number arrays are stacked to shape (n, length). Where length or presence differs between messages the
         column has dtype object: an array or value per message, None where there is none.
+
+        Args:
+            messages: serialized, (n,).
+            fields: of the type, with what is nested in them; None for all.
 
         Raises:
             BagError: the bytes do not fit the type.
@@ -85,7 +89,8 @@ class MessageType:
         for layout, rows in by_layout.values():
             records = np.frombuffer(b"".join([messages[row] for row in rows]), layout.dtype)
             for field in layout.dtype.names or ():
-                columns.setdefault(field, []).append((rows, _native(records[field])))
+                if fields is None or field.partition(".")[0] in fields:
+                    columns.setdefault(field, []).append((rows, _native(records[field])))
         return {field: _merge(parts, len(messages)) for field, parts in columns.items()}
 
     def _layout(self, data: bytes) -> CdrLayout:

@@ -89,20 +89,22 @@ class McapFile:
         """Messages of some channels (None: all) with start_ns <= stamp < end_ns, in file order."""
         for span in self.spans:
             if span.end >= start_ns and span.start < end_ns:
-                for message in self.span_messages(span):
-                    if (channels is None or message.channel_id in channels) and (start_ns <= message.log_time < end_ns):
+                for message in self.span_messages(span, channels):
+                    if start_ns <= message.log_time < end_ns:
                         yield message
 
-    def span_messages(self, span: Span) -> Iterator[Message]:
-        """Messages of one span, in file order."""
+    def span_messages(self, span: Span, channels: Collection[int] | None = None) -> Iterator[Message]:
+        """Messages of some channels (None: all) in one span, in file order."""
         with self._open() as stream:
             try:
                 if span.offset is None:
                     records: Iterator[McapRecord] = StreamReader(stream, validate_crcs=True).records
                 else:
                     stream.seek(span.offset + _RECORD.size)
-                    records = chunk_records(chunk_content(Chunk.read(ReadDataStream(stream))))
-                yield from (record for record in records if isinstance(record, Message))
+                    records = chunk_records(chunk_content(Chunk.read(ReadDataStream(stream))), channels)
+                for record in records:
+                    if isinstance(record, Message) and (channels is None or record.channel_id in channels):
+                        yield record
             except UNREADABLE as error:
                 if self.damage is None or span.offset is not None:
                     raise BagError(
@@ -198,11 +200,15 @@ def chunk_content(chunk: Chunk) -> bytes:
     return stream.read(length)
 
 
-def chunk_records(content: bytes) -> Iterator[Message | Schema | Channel]:
+def chunk_records(content: bytes, channels: Collection[int] | None = None) -> Iterator[Message | Schema | Channel]:
     """Records of a decompressed chunk, in order; raises one of UNREADABLE at a truncated record.
 
     Unlike mcap's `breakup_chunk` it holds one record at a time, detects a truncated one, and takes a third of
     the time.
+
+    Args:
+        content: of the chunk.
+        channels: of the messages; None for all.
     """
     offset, end = 0, len(content)
     while offset < end:
@@ -212,7 +218,8 @@ def chunk_records(content: bytes) -> Iterator[Message | Schema | Channel]:
             raise EndOfFile
         if opcode == Opcode.MESSAGE:
             channel, sequence, stamp, publish_time = _MESSAGE.unpack_from(content, body)
-            yield Message(channel, stamp, content[body + _MESSAGE.size : offset], publish_time, sequence)
+            if channels is None or channel in channels:
+                yield Message(channel, stamp, content[body + _MESSAGE.size : offset], publish_time, sequence)
         elif opcode == Opcode.SCHEMA:
             yield Schema.read(ReadDataStream(BytesIO(content[body:offset])))
         elif opcode == Opcode.CHANNEL:

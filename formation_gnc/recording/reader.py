@@ -1,9 +1,9 @@
 """Reading bags: raw messages in bounded memory, decoded messages, and whole topics as NumPy arrays."""
 
 import heapq
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import count, groupby, takewhile
 from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -44,6 +44,11 @@ class Fields(Arrays):
     def __missing__(self, field: str) -> NoReturn:
         """Raise BagError."""
         raise BagError(f"{self._source}: no message has a field {field}")
+
+    def elements(self, field: str) -> Iterator[str]:
+        """Names of the elements of a list of messages, "readings.0" and so on, of the longest list."""
+        names = (f"{field}.{index}" for index in count())
+        return takewhile(lambda name: any(each.startswith(f"{name}.") for each in self), names)
 
     def integers(self, field: str) -> NDArray[np.int64]:
         """Values of a field of integers.
@@ -121,34 +126,46 @@ class Bag:
         for topic, data, stamp in self.messages(topics, start_ns, end_ns):
             yield topic, self.message_type(topic).message(data), stamp
 
-    def arrays(self, topic: str) -> Fields:
+    def arrays(self, topic: str, fields: Collection[str] | None = None) -> Fields:
         """All messages of a topic: an array per field, a row per message in recorded order.
 
         "stamp_ns" is the stamp (int64, ns), "time" the same in s; then the fields of the message as in
         `MessageType.arrays`.
-        """
-        return self._as_arrays(topic, [(data, stamp) for _, data, stamp in self.messages([topic])])
 
-    def batches(self, topics: Sequence[str], size: int = 1024) -> Iterator[tuple[str, Fields]]:
-        """Messages as (topic, `arrays` of `size` of them) in one pass, for bags of any length.
+        Args:
+            topic: full name.
+            fields: of the message, with what is nested in them; None for all.
+        """
+        return self._as_arrays(topic, [(data, stamp) for _, data, stamp in self.messages([topic])], fields)
+
+    def batches(
+        self, topics: Sequence[str], size: int = 1024, fields: Mapping[str, Collection[str]] | None = None
+    ) -> Iterator[tuple[str, Fields]]:
+        """Messages as (topic, `arrays` of some of them) in one pass, for bags of any length.
 
         Those of each topic come in recorded order.
+
+        Args:
+            topics: full names.
+            size: most messages of a batch.
+            fields: of the messages by topic, as for `arrays`; all of a topic without an entry.
         """
+        wanted = fields or {}
         waiting: dict[str, list[tuple[bytes, int]]] = {topic: [] for topic in topics}
         for topic, data, stamp in self.messages(topics):
             rows = waiting[topic]
             rows.append((data, stamp))
             if len(rows) == size:
                 waiting[topic] = []
-                yield topic, self._as_arrays(topic, rows)
+                yield topic, self._as_arrays(topic, rows, wanted.get(topic))
         for topic, rows in waiting.items():
             if rows:
-                yield topic, self._as_arrays(topic, rows)
+                yield topic, self._as_arrays(topic, rows, wanted.get(topic))
 
-    def _as_arrays(self, topic: str, rows: list[tuple[bytes, int]]) -> Fields:
+    def _as_arrays(self, topic: str, rows: list[tuple[bytes, int]], fields: Collection[str] | None) -> Fields:
         stamps = np.array([stamp for _, stamp in rows], dtype=np.int64)
-        fields = self.message_type(topic).arrays([data for data, _ in rows])
-        return Fields(f"{self.path}: topic {topic}", {"stamp_ns": stamps, "time": stamps * 1e-9, **fields})
+        arrays = self.message_type(topic).arrays([data for data, _ in rows], fields)
+        return Fields(f"{self.path}: topic {topic}", {"stamp_ns": stamps, "time": stamps * 1e-9, **arrays})
 
     def by_stamp(self, topics: Sequence[str]) -> Iterator[tuple[int, str, list[bytes]]]:
         """Canonical messages by (stamp, topic), sorted, also among those of one stamp and topic.
@@ -157,6 +174,7 @@ class Bag:
         chunk may still precede.
         """
         wanted = self._known(topics)
+        channels = {file: {id for id, each in file.channels.items() if each.topic in wanted} for file in self._files}
         spans = [(file, span) for file in self._files for span in file.spans]
         settled = [2**64]  # by span: every later message has at least this stamp
         for _, span in reversed(spans[1:]):
@@ -165,11 +183,10 @@ class Bag:
 
         def in_order() -> Iterator[tuple[int, str, bytes]]:
             for (file, span), limit in zip(spans, reversed(settled), strict=False):
-                for message in file.span_messages(span):
-                    channel = file.channels.get(message.channel_id)
-                    if channel is not None and channel.topic in wanted:
-                        data = self.message_type(channel.topic).canonical(message.data)
-                        heapq.heappush(waiting, (message.log_time, channel.topic, data))
+                for message in file.span_messages(span, channels[file]):
+                    topic = file.channels[message.channel_id].topic
+                    data = self.message_type(topic).canonical(message.data)
+                    heapq.heappush(waiting, (message.log_time, topic, data))
                 while waiting and waiting[0][0] < limit:
                     yield heapq.heappop(waiting)
 
