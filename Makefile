@@ -5,14 +5,16 @@ SHELL := /bin/bash
 
 in_environment := source ./env.sh &&
 # An installed ROS puts pytest plug-ins of its own in the way.
-pytest := python -m pytest --disable-plugin-autoload -p pytest_randomly -p pytest_timeout -p _hypothesis_pytestplugin
+pytest := python -m pytest --disable-plugin-autoload -p randomly -p timeout -p hypothesispytest --timeout 300
+# Tests without processes share the cores; those with processes have the machine for themselves.
+shared := -p xdist -n auto --dist worksteal
 
 .PHONY: help setup demo test test-fast check bench verify lock clean force
 
 help:
 	@echo "make demo        fly the default scenario on the node graph, and record it"
 	@echo "make test        lint, types and the test suite"
-	@echo "make test-fast   the tests that start no node processes"
+	@echo "make test-fast   the quick ones of the tests that start no node processes"
 	@echo "make check       lint and types"
 	@echo "make bench       measure speed, into build/bench.json"
 	@echo "make verify      long runs against independent programs, into docs/verification/"
@@ -29,16 +31,17 @@ check: setup
 	@$(in_environment) ruff check . && ruff format --check . && mypy
 
 test: check
-	@$(in_environment) $(pytest) --timeout 300 -m "not slow"
+	@$(in_environment) $(pytest) $(shared) -m "not sil and not slow"; status=$$?; \
+		$(pytest) -m "sil and not slow" && exit $$status
 
 test-fast: setup
-	@$(in_environment) $(pytest) --timeout 300 -m "not sil and not slow"
+	@$(in_environment) $(pytest) $(shared) --hypothesis-profile fast -m "not sil and not slow and not thorough"
 
 bench: .venv/.verify
 	@$(in_environment) python -m bench
 
 verify: .venv/.verify
-	@$(in_environment) $(pytest) -m slow && python -m verification
+	@$(in_environment) $(pytest) --timeout 0 -m slow && python -m verification
 
 # Which ROS, and for which place: a change of either is a new environment.
 .ros: force

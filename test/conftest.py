@@ -4,6 +4,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# No deadlines: the cost of a random orbit varies, and so does the load of the machine. A test that needs another
+# number of examples sets it itself.
+settings.register_profile("suite", deadline=None, max_examples=25)
+settings.register_profile("fast", settings.get_profile("suite"), max_examples=10)  # `make test-fast`
+settings.load_profile("suite")
 
 
 @pytest.fixture(scope="module")

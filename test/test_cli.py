@@ -177,6 +177,7 @@ def test_an_unknown_command_is_rejected_with_a_hint(
     assert printed.endswith("see `formation-gnc --help`\n")
 
 
+@pytest.mark.thorough
 def test_the_installed_command_rejects_in_one_line(desk: Path) -> None:
     ended = subprocess.run(
         ["formation-gnc", "sil", "nowhere"],
@@ -191,6 +192,7 @@ def test_the_installed_command_rejects_in_one_line(desk: Path) -> None:
     assert ended.stderr.count("\n") == 1
 
 
+@pytest.mark.thorough
 def test_json_is_one_object_with_stable_names(desk: Path, capsys: pytest.CaptureFixture[str]) -> None:
     options = ["--duration", "30.5", "--seed", "5", "--bag", "flights/first", "--json", "--in-process"]
     assert call("sil", "leader_follower", *options) == 0
@@ -210,6 +212,7 @@ def test_json_is_one_object_with_stable_names(desk: Path, capsys: pytest.Capture
     assert bag.topics["/truth"].count == 31
 
 
+@pytest.mark.thorough
 def test_the_summary_names_the_figures_the_bag_and_the_picture(desk: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert call("sil", "leader_follower", "--controller", "coast", "--duration", "12", "--in-process") == 0
     printed = capsys.readouterr().out
@@ -283,6 +286,7 @@ def test_help_of_a_command_describes_all_its_options(name: str, capsys: pytest.C
         assert max(action.option_strings or [action.dest], key=len) in printed
 
 
+@pytest.mark.thorough
 def test_a_flight_does_not_import_plotting_libraries() -> None:
     asked = (
         "import sys; from formation_gnc.cli import main; status = main(['sil', 'nowhere']); "

@@ -95,6 +95,7 @@ def test_a_missing_bag_is_rejected_in_one_line(
         assert errors.count("\n") == 1
 
 
+@pytest.mark.thorough
 def test_compare_names_identical_and_different_bags(
     reference: Path, other: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -218,6 +219,7 @@ def test_outputs_of_a_killed_node_are_not_expected(
     assert replayed(killed, tmp_path / "killed again", "--nodes", "controller")[0] == 0
 
 
+@pytest.mark.thorough
 def test_a_restarted_node_replays_with_its_recorded_parameters(
     reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -57,6 +57,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (250, {}),
     ],
 )
+@pytest.mark.thorough
 def test_the_unchanged_filter_gives_the_recorded_bits(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], change_at: int, navigation: dict[str, Any]
 ) -> None:

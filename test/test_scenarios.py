@@ -17,6 +17,7 @@ TICKS = 60
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.thorough
 def test_every_scenario_replays_to_the_recorded_bits(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

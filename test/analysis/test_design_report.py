@@ -18,6 +18,7 @@ def described(**values):
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.thorough
 def test_every_law_is_reported_and_drawn(algorithm, tmp_path):
     designed = described(algorithm=algorithm, lqr__integral_error=3000.0)
     json.dumps(designed.figures)
@@ -59,6 +60,7 @@ def test_hinf_singular_values_stay_below_their_bounds():
         assert (values[name].max(axis=1) <= values[bound].min(axis=1)).all()
 
 
+@pytest.mark.thorough
 def test_a_periodic_loop_has_characteristic_exponents():
     # On a circular orbit the exponents are the poles of the time-invariant loop.
     circular = described(algorithm="lqr", lqr__model="tschauner_hempel", lqr__gain="periodic")

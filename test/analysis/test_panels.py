@@ -58,6 +58,7 @@ def toy() -> Iterator[DeputyPanel]:
     DEPUTY_PANELS.remove(panel)
 
 
+@pytest.mark.thorough
 def test_a_new_panel_is_in_overview_pictures_and_page(
     toy: DeputyPanel, bag: Bag, history: RunHistory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -96,6 +97,7 @@ def test_a_single_deputy_has_no_distances(history: RunHistory, fleet: RunHistory
     assert len(distances.plots(fleet)[0].curves) == 6
 
 
+@pytest.mark.thorough
 def test_each_panel_with_data_has_a_picture(history: RunHistory, tmp_path: Path) -> None:
     pictures = draw_panels(history, tmp_path)
     without_data = {"solver", "timing"}  # of LQR, in-process

@@ -62,6 +62,7 @@ def test_the_page_is_self_contained_and_describes_the_run(page: Path, bag: Bag) 
     # the trajectory, for a fleet the distances, and three figures of each deputy
     [("leader_follower", COAST, 1, 1 + 3), ("tetrahedral", CHANGE, 4, 1 + 1 + 4 * 3)],
 )
+@pytest.mark.thorough
 def test_a_browser_shows_the_page_and_its_slider_moves_every_deputy(
     tmp_path: Path, scenario: str, change: dict[str, dict[str, Any]], deputies: int, plots: int
 ) -> None:

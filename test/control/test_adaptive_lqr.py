@@ -122,6 +122,7 @@ def test_a_constant_disturbance_leaves_nearly_the_optimal_offset(law, common, ve
     np.testing.assert_allclose(learnt[-1, :3], expected[:3], atol=0.35 * np.linalg.norm(expected[:3]))
 
 
+@pytest.mark.thorough
 def test_a_wrong_chief_orbit_leaves_less_error_than_with_lqr(vehicle, estimate, target):
     """Model: circular, 10 % low. Truth: e = 0.3, with a fixed target that is not in free motion."""
     modelled = CommonParameters(Orbit(9e6), tick=10.0)
@@ -203,7 +204,7 @@ def test_an_identification_time_too_short_for_the_tick_is_rejected(law, common, 
 numbers = st.floats(-1e200, 1e200)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     states=st.lists(st.lists(numbers, min_size=6, max_size=6), min_size=4, max_size=4),
     inertia=st.floats(0.0, 10.0),

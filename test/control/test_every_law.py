@@ -53,7 +53,7 @@ def ticks(draw: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
-@settings(deadline=None, max_examples=12)
+@settings(max_examples=12)
 @given(flight=st.lists(ticks(), min_size=1, max_size=4), limit=st.sampled_from([LIMIT, STRONG]))
 def test_the_thrust_is_finite_and_within_the_limit(algorithm, flight, limit, estimate, target):
     mpc = {"mpc__keep_out_radius": 20.0, "mpc__off_in_eclipse": True, "mpc__horizon": 40}
@@ -80,7 +80,7 @@ positions, velocities = (st.tuples(*[st.floats(-size, size)] * 3) for size in (1
 
 
 @pytest.mark.parametrize("algorithm", FINITE_HORIZONS)
-@settings(deadline=None, max_examples=12)
+@settings(max_examples=12)
 @given(position=positions, velocity=velocities, goal=positions)
 def test_a_feasible_reconfiguration_is_planned_and_followed(algorithm, position, velocity, goal, estimate, target):
     manager = manager_of(algorithm, thrust_limit=tuple(STRONG))

@@ -41,6 +41,7 @@ def test_an_offset_is_recovered_within_about_half_an_orbit(gain, model, common, 
 
 
 @pytest.mark.parametrize("gain", ["frozen", "periodic"])
+@pytest.mark.thorough
 def test_gains_along_an_eccentric_orbit_stabilise_it(gain, vehicle, estimate, target):
     common = CommonParameters(Orbit(1.2e7, eccentricity=0.4), tick=10.0)
     law = LinearQuadraticRegulator(dataclasses.replace(ROBERTS, model="tschauner_hempel", gain=gain), common, vehicle)

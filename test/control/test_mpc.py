@@ -90,6 +90,7 @@ def test_an_offset_is_recovered_at_the_thrust_limit(common, vehicle, estimate, t
     assert np.linalg.norm(states[-1, :3]) < 0.1
 
 
+@pytest.mark.thorough
 def test_an_eccentric_chief_is_tracked_with_its_own_model(vehicle, estimate, target):
     common = CommonParameters(Orbit(1.0e7, eccentricity=0.3), tick=20.0)
     law = make(common, vehicle, model="tschauner_hempel")
@@ -228,6 +229,7 @@ def pass_chief(law, common, estimate, target, others=NO_NEIGHBOURS):
     return np.array(states), np.array(theirs)
 
 
+@pytest.mark.thorough
 def test_the_keep_out_sphere_about_the_chief_is_avoided(common, vehicle, estimate, target):
     closest = {}
     for radius, chief in ((0.0, True), (40.0, False), (40.0, True)):

@@ -154,7 +154,7 @@ def test_only_the_radial_axis_is_dispensable(law, limit, words, eccentric, estim
 numbers = st.floats(-1e7, 1e7)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     name=st.sampled_from(LAWS),
     states=st.lists(st.lists(numbers, min_size=6, max_size=6), min_size=2, max_size=2),

@@ -109,6 +109,7 @@ def test_finite_gains_minimise_the_cost_over_all_thrust_histories():
         state = phi @ state + gamma @ thrust
 
 
+@pytest.mark.thorough
 def test_periodic_gains_equal_the_tick_by_tick_recursion():
     model = TschaunerHempelModel(KeplerChief(1.0e7, eccentricity=0.4))
     ticks, coarse = 2160, 180

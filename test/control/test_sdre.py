@@ -84,6 +84,7 @@ def test_sdre_acquires_and_holds_a_distant_free_orbit(estimate, target):
     assert np.linalg.norm((states[-1] - goals[-1])[:3]) < 0.1  # of 3.7 km
 
 
+@pytest.mark.thorough
 def test_the_integral_removes_the_offset_of_a_constant_force(estimate, target):
     common = CommonParameters(Orbit(1e7, 0.0), tick=10.0)
     chief = dataclasses.replace(CHIEF, eccentricity=0.0)

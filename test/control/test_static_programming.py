@@ -2,7 +2,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from formation_gnc.control.plan import Task
@@ -159,7 +159,6 @@ def test_the_number_of_iterations_is_bounded(method):
     assert "5 iterations leave" in method(task(50), np.zeros(6), 5).failure
 
 
-@settings(max_examples=25, deadline=None)
 @given(
     st.lists(st.floats(-1e6, 1e6), min_size=6, max_size=6),
     st.lists(st.floats(-1e6, 1e6), min_size=6, max_size=6),

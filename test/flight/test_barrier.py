@@ -141,7 +141,7 @@ class AnyInterleaving(RuleBasedStateMachine):
         self.answer_of(deputy, self.tick - back)
         self.advance()
 
-    @rule(seconds=st.sampled_from([0.05, 0.4, 0.5, 3.0]))
+    @rule(seconds=st.sampled_from([0.0625, 0.375, 0.5, 3.0]))  # sums without rounding: the deadline is met exactly
     def time_passes(self, seconds: float) -> None:
         self.now += seconds
         self.opened += max(0.0, seconds - LONGEST_CHECK_GAP)
@@ -186,4 +186,4 @@ class AnyInterleaving(RuleBasedStateMachine):
 
 
 TestAnyInterleaving = AnyInterleaving.TestCase
-TestAnyInterleaving.settings = settings(max_examples=200, stateful_step_count=40, deadline=None)
+TestAnyInterleaving.settings = settings(max_examples=200, stateful_step_count=40)

@@ -5,16 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import settings
 
 from formation_gnc.guidance.guidance import Guidance
 from formation_gnc.guidance.parameters import GuidanceParameters
 from formation_gnc.parameters import load
 from formation_gnc.records import NavigationState
 from formation_gnc.types import NANOSECONDS
-
-settings.register_profile("no deadline", deadline=None)
-settings.load_profile("no deadline")
 
 BuildGuidance = Callable[..., Guidance]
 EstimateAt = Callable[[float], NavigationState]

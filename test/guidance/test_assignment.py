@@ -65,6 +65,7 @@ def test_fleet_in_formation_is_assigned_its_own_slots_and_phase(phase: float, or
 
 @settings(max_examples=10)
 @given(st.integers(0, 10_000))
+@pytest.mark.thorough
 def test_free_phase_costs_no_more_than_the_best_of_a_fine_grid(seed: int) -> None:
     states = np.random.default_rng(seed).normal(0.0, 300.0, (4, 6)) * np.repeat([1.0, RATE], 3)
     costs = transfer_costs(states, lambda at: slot_states("tetrahedral", at), 2.0 * ORBIT, RATE)

@@ -26,6 +26,7 @@ def test_short_cross_track_transfer_takes_the_bang_bang_time(distance: float) ->
 
 @settings(max_examples=15)
 @given(errors)
+@pytest.mark.thorough
 def test_twice_the_thrust_is_never_slower(error: np.ndarray) -> None:
     # found to one per cent
     assert shortest_time(error, 2.0 * LIMITS, RATE) <= 1.02 * shortest_time(error, LIMITS, RATE)

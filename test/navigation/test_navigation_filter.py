@@ -89,6 +89,7 @@ def error_in_turn(estimate: Estimate, truth: Vector) -> float:
 
 @pytest.mark.parametrize("filter", ["ekf", "ukf"])
 @pytest.mark.parametrize("sensors", [THREE, (*THREE, "right_ascension"), (*THREE, "chief_range")])
+@pytest.mark.thorough
 def test_nees_and_nis_are_those_of_a_consistent_filter(filter: str, sensors: tuple[str, ...]) -> None:
     runs, ticks = (40, 60) if filter == "ekf" else (10, 40)
     setup = parameters(LEO, tick=60.0, sensors=sensors, filter=filter, acceleration_density=1e-10)
@@ -139,7 +140,7 @@ def test_covariance_stays_large_in_the_unobservable_direction_only() -> None:
     st.floats(-3.0, 3.0),
     st.floats(-3.0, 3.0),
 )
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_the_gramian_finds_the_predicted_direction_at_any_inclination(
     axis: float, eccentricity: float, inclination: float, perigee: float, anomaly: float
 ) -> None:
@@ -548,7 +549,7 @@ def check(estimate: Estimate) -> None:
     st.sampled_from(["nonlinear_j2", "hill"]),
     st.booleans(),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_estimates_stay_finite_and_definite_for_any_stream(
     spoils: list[tuple[int, int, str]],
     doubled: list[int],

@@ -75,6 +75,7 @@ def run_plant(values: dict[str, Any] | None = None) -> list[float]:
     return plant.truth().chief_state.tolist()
 
 
+@pytest.mark.thorough
 def test_new_force_is_one_file_and_one_line(tmp_path):
     (tmp_path / "along_track.py").write_text(ALONG_TRACK)
     (tmp_path / "flights.py").write_text(FLIGHTS)

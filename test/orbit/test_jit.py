@@ -92,6 +92,7 @@ def test_kernels_are_built_from_the_folders_of_their_cache_key():
         assert all(each.startswith(keyed) for each in imported - free_of_kernels), file
 
 
+@pytest.mark.thorough
 def test_concurrent_compilation_is_safe(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(KERNEL)

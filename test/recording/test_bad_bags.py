@@ -141,9 +141,8 @@ def test_a_bad_bag_is_rejected_in_one_line(
 
 
 @pytest.mark.parametrize("command", ["export", "compare", "navigate", "replay", "recover"])
-@settings(
-    max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)  # test_recover sweeps all bytes
+# test_recover sweeps all bytes.
+@settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_truncated_and_flipped_bytes_never_raise_a_traceback(
     whole: Path, tmp_path: Path, command: str, data: Any, capsys: pytest.CaptureFixture[str]

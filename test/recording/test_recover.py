@@ -27,7 +27,7 @@ class Messages(list):
         return f"<{len(self)} messages>"
 
 
-on_one_file = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+on_one_file = settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 @pytest.fixture(scope="module")
@@ -118,6 +118,7 @@ def test_a_cut_loses_at_most_its_chunk(log, damaged, data) -> None:
 
 @on_one_file
 @given(st.data())
+@pytest.mark.thorough
 def test_a_flipped_byte_is_detected_and_spares_the_other_chunks(log, damaged, data) -> None:
     path, messages, spans = log
     content = bytearray(path.read_bytes())

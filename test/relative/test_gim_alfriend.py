@@ -63,7 +63,7 @@ def test_sigma_is_the_derivative_of_the_relative_state(elements):
         np.testing.assert_allclose(difference[3:], column[3:], atol=1e-7 * size * elements.mean_motion)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(orbits, st.floats(0.0, 5.0))
 def test_transition_solves_the_variational_equations(elements, turns):
     model = GimAlfriendModel(elements)
@@ -78,6 +78,7 @@ def test_transition_solves_the_variational_equations(elements, turns):
     np.testing.assert_allclose(ours, exact, atol=60.0 * strength**2 * np.abs(exact).max() + 1e-11)
 
 
+@pytest.mark.thorough
 def test_error_falls_with_the_square_of_j2():
     # J2 (Re / a)^2 is four times smaller at twice the radius, its square sixteen times.
     errors = []
@@ -103,7 +104,7 @@ def test_transition_improves_on_tschauner_hempel_by_the_order_of_j2():
     assert errors[1] > 1e-3
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(orbits, st.floats(0.0, 1.0), st.floats(0.0, 1.0))
 def test_transition_is_a_group_to_the_order_of_the_theory(elements, first, second):
     model = GimAlfriendModel(elements)

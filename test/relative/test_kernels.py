@@ -22,7 +22,7 @@ MODELS = {
 
 
 @pytest.mark.parametrize("name", MODELS)
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(
     direction=st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6),
     size=st.floats(-3.0, 6.5),

@@ -75,6 +75,7 @@ def test_propagation_is_reversible(model: RelativeModel):
 
 
 @every_model
+@pytest.mark.thorough
 def test_bounded_start_changes_only_the_along_track_rate(model: RelativeModel):
     start = model.bounded(0.0, STATE)
     np.testing.assert_array_equal(start[[0, 1, 2, 3, 5]], STATE[[0, 1, 2, 3, 5]])
@@ -108,6 +109,7 @@ def test_zero_state_stays_zero(model: RelativeModel):
     ],
     ids=["hill", "tschauner_hempel", "gim_alfriend"],
 )
+@pytest.mark.thorough
 def test_error_of_a_linear_model_is_quadratic_in_the_separation(linear: RelativeModel, truth: RelativeModel):
     shape = np.array([1.0, 2.0, -1.0, 1e-3, -2e-3, 5e-4])
     errors = []

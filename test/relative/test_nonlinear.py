@@ -40,8 +40,9 @@ def kepler(state, duration):
     return solution.y[:, -1]
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(orbits, states)
+@pytest.mark.thorough
 def test_motion_is_the_difference_of_two_inertial_orbits(elements, state):
     chief = state_from_elements(elements)
     model = NonlinearModel(KeplerChief.of(elements))
@@ -73,7 +74,7 @@ def test_jacobian_is_the_derivative(elements, state, time):
     )
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(orbits, states)
 def test_bounded_state_has_the_chiefs_energy(elements, state):
     model = NonlinearModel(KeplerChief.of(elements))

@@ -58,8 +58,9 @@ def test_reference_acceleration_is_the_gradient_of_the_potential():
     np.testing.assert_allclose(attraction(place), gradient, rtol=1e-8)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(orbits, states)
+@pytest.mark.thorough
 def test_motion_is_the_difference_of_two_inertial_orbits(elements, state):
     chief = state_from_elements(elements)
     model = OblateModel(OblateChief(elements))
@@ -91,7 +92,7 @@ def test_jacobian_is_the_derivative(elements, state, time):
     )
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(orbits, st.floats(0.0, 3e4), st.floats(-2e4, 2e4))
 def test_oblate_chief_does_not_depend_on_earlier_calls(elements, first, second):
     once = OblateChief(elements).inertial(first).copy()
@@ -125,6 +126,7 @@ def test_latitude_repeats_after_a_nodal_period(inclination):
         assert math.remainder(latitude - 0.9, math.tau) == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.thorough
 def test_bounded_motion_does_not_drift_where_the_two_body_one_does():
     elements = Elements(7.2e6, 0.01, 0.9, 0.3, 0.4, 0.5)
     model = OblateModel(OblateChief(elements))

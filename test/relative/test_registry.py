@@ -150,6 +150,7 @@ def run_scenario(model: str) -> dict[str, Any]:
     }
 
 
+@pytest.mark.thorough
 def test_new_model_is_one_file_and_one_line(tmp_path):
     (tmp_path / "toy.py").write_text(TOY)
     (tmp_path / "flight.py").write_text(FLIGHT)

@@ -65,6 +65,7 @@ def test_averaged_acceleration_is_radial_and_sets_the_orbital_rate(reference):
     start=st.floats(-1.0, 1.0),
     turns=st.floats(-1.5, 1.5).filter(lambda turns: abs(turns) > 1e-9),
 )
+@pytest.mark.thorough
 def test_closed_form_solves_the_differential_equation(kind, reference, start, turns):
     model = kind(reference)
     time, duration = start * 1e4, turns * math.tau / reference.mean_motion
@@ -109,8 +110,9 @@ def test_centred_state_has_no_drift_and_no_offset(reference, values):
     assert q == pytest.approx(reference.mean_motion * math.sqrt(1.0 - reference.averaged), rel=1e-14, abs=0.0)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.floats(6.6e6, 4.2e7), st.floats(0.05, math.pi - 0.05), numbers)
+@pytest.mark.thorough
 def test_perturbed_satellite_from_the_equator_stays_by_the_reference(radius, inclination, values):
     # Roberts (28)-(30) and the averaged gradient with the J2 forces of (35) left unaveraged.
     reference = CircularReference(radius, inclination)
@@ -179,6 +181,7 @@ def test_cross_track_extension_equals_that_of_schweighart_and_sedwick():
 
 
 @pytest.mark.parametrize("inclination", [35.0, 97.87])
+@pytest.mark.thorough
 def test_cross_track_extension_improves_on_the_average(inclination):
     reference = CircularReference(7e6, math.radians(inclination))
     model = SchweighartSedwickNodalModel(reference)

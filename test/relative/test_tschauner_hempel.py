@@ -27,8 +27,9 @@ def scaled(model, matrix):
     return matrix * unit / unit[:, None]
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(models, fractions, fractions)
+@pytest.mark.thorough
 def test_transition_solves_the_differential_equation(model, start, turns):
     time, duration = start * model.period, turns * model.period
     closed = scaled(model, model.transition(time, duration))

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("rclpy")
+pytestmark = pytest.mark.thorough
 
 # The one file ...
 RELATIVE_POSITION = '''

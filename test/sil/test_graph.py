@@ -84,6 +84,7 @@ def load() -> Iterator[None]:
         burner.wait()
 
 
+@pytest.mark.slow  # a flight of minutes on a busy machine
 def test_law_swaps_under_load_miss_no_tick_and_keep_the_step_bound(desk: Desk, load: None) -> None:
     bag = desk.directory / "bag"
     desk.start("recorder", bag=bag)
@@ -116,15 +117,6 @@ def test_law_swaps_under_load_miss_no_tick_and_keep_the_step_bound(desk: Desk, l
     # a tenth of the 10 mN limit
     steps = np.abs(np.diff(thrust["force"], axis=0)).max(axis=1)
     assert (steps[np.array(at) - 1] <= 0.001 * (1.0 + 1e-12)).all()
-
-
-def test_the_plant_waits_and_says_for_whom(desk: Desk) -> None:
-    plant = desk.start("plant", duration=10.0)
-    everyone = ", ".join(f"/deputy1/{part}" for part in PARTS)
-    wait_until(lambda: f"waiting for {everyone}" in plant.text, "a word")
-    for kind in PARTS:
-        desk.start(kind)
-    assert plant.wait() == 0, "the recorder can be left out"
 
 
 def test_a_restarted_node_rejoins_and_its_gap_is_logged_and_replays(

@@ -13,7 +13,6 @@ from typing import Any
 
 import pytest
 import rclpy
-from formation_gnc_msgs.msg import Event
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rclpy.context import Context
@@ -27,7 +26,6 @@ from formation_gnc.recording import Bag
 from formation_gnc.recording.layout import LAYOUT
 from formation_gnc.recording.provenance import LOST
 from formation_gnc.recording.recover import PARTLY_LOST, recover
-from formation_gnc.records import EventKind
 from formation_gnc.transport.qos import LATEST, quality
 from formation_gnc.types import NANOSECONDS
 
@@ -105,124 +103,6 @@ def test_a_recorder_that_comes_late_knows_exactly_what_it_missed(desk: Desk) -> 
     assert "lost so far: " in recorder.text
 
 
-def test_a_recorder_reports_the_end_of_the_flight(desk: Desk) -> None:
-    reported = []
-    with user(desk) as (node, executor):
-        node.create_subscription(Clock, topics.PROGRESS.name, lambda clock: reported.append(clock.clock.sec), quality())
-        desk.start("recorder", bag=desk.directory / "bag")
-        plant = desk.start("plant", duration=20.0, wait_for_recorder=True)
-        for kind in PARTS:
-            desk.start(kind)
-
-        def ended() -> bool:
-            executor.spin_once(timeout_sec=0.0)
-            return plant.process.poll() is not None and bool(reported) and reported[-1] == 20
-
-        wait_until(ended, "the plant gone, and its end reported as recorded")
-    assert reported == sorted(reported)
-
-
-def test_the_plant_stays_until_a_recorder_has_its_end(desk: Desk) -> None:
-    with user(desk) as (node, executor):
-        told: list[int] = []
-        node.create_subscription(Event, topics.EVENTS.name, lambda event: told.append(event.kind), quality())
-        publisher = node.create_publisher(Clock, topics.PROGRESS.name, quality(LATEST))
-
-        def record_up_to(stamp: int) -> None:
-            progress = Clock()
-            progress.clock.sec = stamp
-            publisher.publish(progress)
-
-        record_up_to(19)  # the stamp of the last tick
-        plant = desk.start("plant", duration=20.0)
-        for kind in PARTS:
-            desk.start(kind)
-
-        def ended() -> bool:
-            executor.spin_once(timeout_sec=0.0)
-            return EventKind.END in told
-
-        wait_until(ended, "the end of the flight")
-        with pytest.raises(subprocess.TimeoutExpired):
-            plant.wait(2.0)
-        record_up_to(20)
-        assert plant.wait() == 0
-
-
-PROGRESS = """
-import sys
-import time
-
-import rclpy
-from formation_gnc_msgs import msg
-from rosgraph_msgs.msg import Clock
-
-from formation_gnc.flight import topics
-from formation_gnc.nodes.recorder import RecorderNode
-from formation_gnc.records import EventKind
-from formation_gnc.transport.qos import quality
-
-rclpy.init(args=sys.argv)
-recorder, user = RecorderNode(), rclpy.create_node("user")
-recorder._knows_the_run = lambda: True  # there is no plant to ask
-reported, publishers = [], {}
-recorder.create_subscription(Clock, topics.PROGRESS.name, lambda clock: reported.append(clock.clock.sec), 10)
-
-
-def tell(message_type, topic, stamp, **fields):
-    message = message_type(**fields)
-    (message.clock if message_type is Clock else message.header.stamp).sec = stamp
-    if topic not in publishers:
-        publishers[topic] = user.create_publisher(message_type, topic, quality())
-    publishers[topic].publish(message)
-
-
-def plant(*stamps):
-    for stamp in stamps:
-        tell(msg.Measurement, "/deputy1/measurement", stamp)
-        tell(msg.Truth, "/truth", stamp)
-        tell(Clock, "/clock", stamp)
-
-
-def deputy(*stamps, kinds=(msg.Estimate, msg.Target, msg.Thrust)):
-    for stamp in stamps:
-        for kind in kinds:
-            tell(kind, f"/deputy1/{kind.__name__.lower()}", stamp)
-
-
-def event(kind, stamp, subject=""):
-    tell(msg.Event, "/events", stamp, kind=kind, subject=subject)
-
-
-def progress(expected):
-    end = time.monotonic() + 60.0
-    recorder.spin(lambda: reported[-1:] == [expected] or time.monotonic() > end)
-    recorder.spin(iter((False, True)).__next__, lambda: 0.5)  # it stays so
-    assert reported[-1] == expected, (reported, expected)
-
-
-plant(*range(11))
-progress(-1)  # nobody has answered
-deputy(*range(5))
-progress(4)
-deputy(*range(5, 11), kinds=(msg.Estimate, msg.Thrust))
-progress(4)  # the thrust says that there was a target
-event(EventKind.MISS, 9, "deputy1")
-progress(9)
-deputy(*range(5, 11), kinds=(msg.Target,))
-progress(10)
-event(EventKind.END, 11)
-progress(11)
-plant(0, 1)  # a new run
-progress(-1)
-deputy(0)
-progress(0)
-event(EventKind.END, 2)
-deputy(1)
-progress(2)
-"""
-
-
 def run_in_process_of_its_own(script: str, desk: Desk, bag: Path) -> None:
     """Run a script that makes a recorder, since its node would stay in the domain of later tests."""
     arguments = ["--ros-args", "--params-file", str(desk.parameters), "-p", f"bag:={bag}"]
@@ -235,10 +115,6 @@ def run_in_process_of_its_own(script: str, desk: Desk, bag: Path) -> None:
         check=False,
     )
     assert told.returncode == 0, told.stderr
-
-
-def test_the_recorder_reports_up_to_where_it_has_all_that_was_said(desk: Desk) -> None:
-    run_in_process_of_its_own(PROGRESS, desk, desk.directory / "bag")
 
 
 IDLER = """

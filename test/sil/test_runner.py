@@ -248,6 +248,7 @@ def test_mpc_gives_no_thrust_in_an_eclipse_that_guidance_foresees() -> None:
 
 
 @pytest.mark.parametrize(("radius", "least", "most"), [(0.0, 30.0, 45.0), (60.0, 58.0, 70.0)])
+@pytest.mark.thorough
 def test_mpc_keeps_out_of_the_way_of_the_others_of_its_fleet(radius: float, least: float, most: float) -> None:
     # They start 10 m from one another's places, and change over.
     scenario: Overrides = {
