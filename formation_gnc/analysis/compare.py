@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from itertools import cycle
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -26,6 +27,9 @@ AXES = (
     Axis("delta-v commanded", "mm/s"),
 )
 """Quantities that are compared over time."""
+
+LINES: tuple[Literal["solid", "dashed", "dotted"], ...] = ("solid", "dashed", "dotted")
+"""Lines of runs that follow one another, so that equal curves are seen below one another."""
 
 
 def gnc_topics(*bags: Bag) -> list[str]:
@@ -52,18 +56,20 @@ def run_figures(bag: Bag) -> dict[str, dict[str, float | str]]:
 def draw_comparison(bags: Sequence[Bag], labels: Sequence[str], path: Path) -> None:
     """Draw errors, applied and commanded delta-v over time: a row per deputy, a curve per bag."""
     names = list(dict.fromkeys(name for bag in bags for name in deputies_of(bag)))
-    figure = Figure(figsize=(19.0, 4.2 * len(names) + 0.4), layout="constrained", dpi=100)
+    figure = Figure(figsize=(13.0, 8.0 * len(names) + 0.4), layout="constrained", dpi=100)
     FigureCanvasAgg(figure)
-    grid = figure.add_gridspec(len(names), len(AXES))
+    grid = figure.add_gridspec(len(AXES) // 2 * len(names), 2)
     for row, name in enumerate(names):
         curves: list[list[Curve]] = [[] for _ in AXES]
-        for bag, label, colour in zip(bags, labels, cycle(COLOURS), strict=False):
+        looks = (Style(colour, line) for colour, line in zip(cycle(COLOURS), cycle(LINES)))
+        for bag, label, look in zip(bags, labels, looks, strict=False):
             if name in deputies_of(bag):
                 for of_axis, (time, values) in zip(curves, _series(bag, name), strict=True):
                     step = max(1, len(time) // POINTS)
-                    of_axis.append(Curve(label, time[::step] / 3600.0, values[::step], Style(colour, width=1.1)))
+                    of_axis.append(Curve(label, time[::step] / 3600.0, values[::step], look))
         for column, (axis, of_axis) in enumerate(zip(AXES, curves, strict=True)):
-            draw(figure, grid[row, column], Plot(name, TIME, axis, of_axis))
+            place = grid[len(AXES) // 2 * row + column // 2, column % 2]
+            draw(figure, place, Plot(f"{name}: {axis.label}", TIME, axis, of_axis))
     figure.savefig(path)
 
 

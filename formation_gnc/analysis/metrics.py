@@ -256,3 +256,9 @@ def _limits_met(bag: Bag, deputy: str) -> tuple[float, int]:
         return 0.0, 0
     status = bag.arrays(topic, ("saturated", "fallback"))
     return float(status["saturated"].any(axis=1).mean()), int(np.count_nonzero(status["fallback"] != ""))
+
+
+def law_at_the_end(bag: Bag, deputy: str) -> str:
+    """Name of the control law of the last command; empty without one."""
+    topic = topics.STATUS.of(deputy)
+    return str(bag.arrays(topic, ("algorithm",))["algorithm"][-1]) if has_messages(bag, topic) else ""
