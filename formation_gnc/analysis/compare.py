@@ -51,7 +51,7 @@ def commanded_delta_v(bag: Bag, deputy: str) -> tuple[Vector, Vector]:
     thrust, truth = bag.arrays(topic, ("force",)), bag.arrays(topics.TRUTH.name, ("deputies",))
     prefix = f"deputies.{deputies_of(bag).index(deputy)}."
     mass = np.interp(thrust["time"], truth["time"], truth[f"{prefix}mass"])
-    tick = float(truth["time"][1] - truth["time"][0]) if len(truth["time"]) > 1 else 0.0
+    tick = bag.tick_ns * 1e-9
     return thrust["time"], np.cumsum(np.abs(thrust["force"]).sum(axis=1) / mass) * tick
 
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from formation_gnc.errors import BagError
 from formation_gnc.flight import topics
-from formation_gnc.recording.reader import Bag
-from formation_gnc.records import EventKind
-from formation_gnc.types import Matrix, Vector
+from formation_gnc.recording.reader import Bag, Fields
+from formation_gnc.records import EventKind, kind_name
+from formation_gnc.types import Matrix, Times, Vector
 
 
 @dataclass(frozen=True)
@@ -84,6 +84,33 @@ def deputies_of(bag: Bag) -> list[str]:
     return [str(first[f"deputies.{index}.name"][0]) for index in range(count)]
 
 
+@dataclass(frozen=True)
+class UnseenThrust:
+    """Thrust of a deputy over the ticks that the recorded truth lacks, as its own avionics measured it."""
+
+    stamps: Times
+    """(N,) ends of the ticks, ns, sorted."""
+    acceleration: Matrix
+    """(N, 3) over each, Hill frame, m/s^2."""
+
+    def delta_v_until(self, stamps: Times, tick: float) -> Vector:
+        """(M,) delta-v of the ticks that end at or before each of some stamps (ns), all axes added, m/s."""
+        total = np.concatenate(([0.0], np.cumsum(np.abs(self.acceleration).sum(axis=1)))) * tick
+        return np.asarray(total[np.searchsorted(self.stamps, stamps, side="right")])
+
+
+def unseen_thrust(bag: Bag, deputy: str) -> UnseenThrust:
+    """Thrust of a deputy over the ticks that the recorded truth lacks and its measurements have."""
+    topic = topics.MEASUREMENT.of(deputy)
+    stamps = bag.stamps(topic) if topic in bag.topics and bag.topics[topic].count else np.zeros(0, dtype=np.int64)
+    missing = ~np.isin(stamps, bag.stamps(topics.TRUTH.name))
+    if not missing.any():
+        return UnseenThrust(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
+    measured = bag.arrays(topic, ("applied_force", "mass"))
+    acceleration = measured["applied_force"] / measured["mass"][:, None]
+    return UnseenThrust(stamps[missing], acceleration[missing])
+
+
 def trajectory(bag: Bag, deputy: str) -> Trajectory:
     """Trajectory of one deputy.
 
@@ -102,8 +129,12 @@ def trajectory(bag: Bag, deputy: str) -> Trajectory:
         raise BagError(f"{bag.path}: no tick with an estimate and a target of {deputy}")
     rows = {id(part): np.searchsorted(part["stamp_ns"], stamps) for part in (truth, estimate, target)}
     prefix = f"deputies.{index}."
-    time = truth["time"]
-    tick = float(time[1] - time[0]) if len(time) > 1 else 0.0
+    tick = bag.tick_ns * 1e-9
+    unseen = unseen_thrust(bag, deputy)
+    ends = np.concatenate((truth["stamp_ns"][1:], unseen.stamps))
+    # Truth holds the force of the tick before.
+    applied = (truth[f"{prefix}applied_force"] / truth[f"{prefix}mass"][:, None])[1:]
+    order = np.argsort(ends, kind="stable")
     covariance = estimate["covariance"][rows[id(estimate)]].reshape(-1, 6, 6)
     return Trajectory(
         time=stamps * 1e-9,
@@ -112,11 +143,21 @@ def trajectory(bag: Bag, deputy: str) -> Trajectory:
         sigma=np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)),
         target=target["relative_state"][rows[id(target)]],
         nis=estimate["nis"][rows[id(estimate)]],
-        # Truth holds the force of the tick before.
-        applied=(truth[f"{prefix}applied_force"] / truth[f"{prefix}mass"][:, None])[1:],
-        applied_time=time[:-1],
+        applied=np.concatenate((applied, unseen.acceleration))[order],
+        applied_time=ends[order] * 1e-9 - tick,
         tick=tick,
     )
+
+
+def event_kinds(events: Fields) -> list[str]:
+    """Names of the kinds of events, which bags of 0.1.0 have as text.
+
+    Raises:
+        BagError: they are neither numbers nor text.
+    """
+    if events["kind"].dtype.kind == "U":
+        return [str(kind) for kind in events["kind"]]
+    return [kind_name(kind) for kind in events.integers("kind").tolist()]
 
 
 def figures(bag: Bag) -> RunFigures:
@@ -140,5 +181,5 @@ def figures(bag: Bag) -> RunFigures:
             delta_v_axes_m_s=path.delta_v.tolist(),
         )
     has_events = topics.EVENTS.name in bag.topics and bag.topics[topics.EVENTS.name].count > 0
-    misses = np.count_nonzero(bag.arrays(topics.EVENTS.name).integers("kind") == EventKind.MISS) if has_events else 0
-    return RunFigures(bag.topics[topics.TRUTH.name].count, int(misses), deputies)
+    kinds = event_kinds(bag.arrays(topics.EVENTS.name, ("kind",))) if has_events else []
+    return RunFigures(bag.topics[topics.TRUTH.name].count, kinds.count(kind_name(EventKind.MISS)), deputies)
