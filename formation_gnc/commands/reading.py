@@ -24,6 +24,6 @@ def numbered(path: Path, number: int, count: int) -> Path:
 
 def print_remarks(bags: Iterable[Bag]) -> None:
     """Print what is damaged, missing, left out, doubled or out of order, each line once."""
-    bags = list(bags)
-    for line in dict.fromkeys(f"{bag.path}: {remark}" for bag in bags for remark in bag.remarks):
+    lines = [(bag.path, remark) for bag in bags for remark in bag.remarks]
+    for line in dict.fromkeys(text if text.startswith(str(path)) else f"{path}: {text}" for path, text in lines):
         print(f"note: {line}")

@@ -40,6 +40,15 @@ _PRIVATE = 0x80  # first opcode of others' records
 FileRecord = Message | Schema | Channel | Chunk | Metadata | Attachment
 
 
+class DamagedRecordError(McapError):
+    """A record that is cut or damaged, at an offset in the file."""
+
+    def __init__(self, offset: int, reason: Exception) -> None:
+        """Name the reason, or its kind where it has no words."""
+        super().__init__(str(reason) or type(reason).__name__)
+        self.offset = offset
+
+
 class McapFile(StoredFile):
     """One MCAP file.
 
@@ -63,22 +72,21 @@ class McapFile(StoredFile):
             raise BagError(f"{self.path}: cannot be read: {error.strerror}") from None
 
     def _scan(self, stream: BinaryIO) -> None:
-        offset, outside = len(MAGIC), Span(None)
+        outside = Span(None)
         is_finished = _is_finished(stream)
         try:
             for offset, record in file_records(stream):
                 if isinstance(record, Chunk):
-                    records = list(chunk_records(chunk_content(record)))  # all or none of a damaged one
+                    records = _unpacked(record, offset)
                     span = self._begin_span(offset)
                     for inner in records:
                         self._add(inner, span)
                 else:
                     self._add(record, outside)
-        except UNREADABLE as error:
-            reason = f"({str(error) or type(error).__name__})"
+        except DamagedRecordError as error:
             if is_finished:
-                raise self._damaged(offset, reason) from None
-            self.damage = f"{self.path}: cut or damaged at byte {offset} {reason}"
+                raise self._damaged(error.offset, f"({error})") from None
+            self.damage = f"{self.path}: cut or damaged at byte {error.offset} ({error})"
         if not is_finished and self.damage is None:
             self.damage = f"{self.path}: was not closed, what came last may be missing"
         if outside.start <= outside.end:
@@ -118,9 +126,9 @@ class McapFile(StoredFile):
             yield from chunk_records(chunk_content(Chunk.read(ReadDataStream(stream))), channels)
             return
         stream.seek(len(MAGIC))
-        for _, record in file_records(stream):
+        for offset, record in file_records(stream):
             if isinstance(record, Chunk):
-                yield from list(chunk_records(chunk_content(record), channels))
+                yield from _unpacked(record, offset)
             else:
                 yield record
 
@@ -128,8 +136,24 @@ class McapFile(StoredFile):
 def file_records(stream: BinaryIO) -> Iterator[tuple[int, FileRecord]]:
     """Records of the data section with their offsets, from where the stream stands; chunks as they are.
 
-    Raises one of UNREADABLE at a truncated or damaged record.
+    Raises DamagedRecordError at a truncated or damaged record.
     """
+    offset = stream.tell()
+    size = stream.seek(0, SEEK_END)
+    while offset < size:
+        try:
+            opcode, record, end = _file_record(stream, offset, size)
+        except UNREADABLE as error:
+            raise DamagedRecordError(offset, error) from None
+        if opcode in (Opcode.DATA_END, Opcode.FOOTER):
+            return
+        if record is not None:
+            yield offset, record
+        offset = end
+
+
+def _file_record(stream: BinaryIO, offset: int, size: int) -> tuple[int, FileRecord | None, int]:
+    """Opcode, record (None for one that is passed over) and end of what begins at an offset of a file."""
     readers: dict[int, Callable[[ReadDataStream], FileRecord]] = {
         Opcode.SCHEMA: Schema.read,
         Opcode.CHANNEL: Channel.read,
@@ -137,23 +161,26 @@ def file_records(stream: BinaryIO) -> Iterator[tuple[int, FileRecord]]:
         Opcode.METADATA: Metadata.read,
         Opcode.ATTACHMENT: Attachment.read,
     }
-    offset = stream.tell()
-    size = stream.seek(0, SEEK_END)
-    while offset < size:
-        stream.seek(offset)
-        opcode, length = _RECORD.unpack(stream.read(_RECORD.size))
-        end = offset + _RECORD.size + length
-        if end > size:
-            raise EndOfFile
-        if opcode in (Opcode.DATA_END, Opcode.FOOTER):
-            return
-        if opcode == Opcode.MESSAGE:
-            yield offset, next(chunk_records(_RECORD.pack(opcode, length) + stream.read(length)))  # type: ignore[misc]
-        elif opcode in readers:
-            yield offset, readers[opcode](ReadDataStream(BytesIO(stream.read(length))))
-        elif opcode < _PRIVATE and opcode not in Opcode:
-            raise ValueError(f"record of unknown kind {opcode}")
-        offset = end
+    stream.seek(offset)
+    opcode, length = _RECORD.unpack(stream.read(_RECORD.size))
+    end = offset + _RECORD.size + length
+    if end > size:
+        raise EOFError("the file ends within a record")
+    if opcode == Opcode.MESSAGE:
+        return opcode, next(chunk_records(_RECORD.pack(opcode, length) + stream.read(length))), end
+    if opcode in readers:
+        return opcode, readers[opcode](ReadDataStream(BytesIO(stream.read(length)))), end
+    if opcode < _PRIVATE and opcode not in list(Opcode):
+        raise ValueError(f"record of unknown kind {opcode}")
+    return opcode, None, end
+
+
+def _unpacked(chunk: Chunk, offset: int) -> list[Message | Schema | Channel]:
+    """All records of a chunk at an offset of a file; raises DamagedRecordError."""
+    try:
+        return list(chunk_records(chunk_content(chunk)))
+    except UNREADABLE as error:
+        raise DamagedRecordError(offset, error) from None
 
 
 def _is_finished(stream: BinaryIO) -> bool:

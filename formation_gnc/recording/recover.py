@@ -126,6 +126,7 @@ def _surveyed(path: Path) -> _Survey:
                 case Attachment():
                     survey.attachments[record.name] = record.data
         survey.reasons = reader.reasons
+        survey.indexed = survey.indexed and not reader.has_wrong_lengths
     survey.count(found, _missing(summary, found, missing))
     return survey
 
