@@ -88,7 +88,7 @@ class McapFile(StoredFile):
                 raise self._damaged(error.offset, f"({error})") from None
             self.damage = f"{self.path}: cut or damaged at byte {error.offset} ({error})"
         if not is_finished and self.damage is None:
-            self.damage = f"{self.path}: was not closed, what came last may be missing"
+            self.damage = f"{self.path}: cut: it was not closed, what came last may be missing"
         if outside.start <= outside.end:
             ends = [*self.spans, outside]
             self.spans = [Span(None, min(span.start for span in ends), max(span.end for span in ends))]
@@ -134,19 +134,25 @@ class McapFile(StoredFile):
 
 
 def file_records(stream: BinaryIO) -> Iterator[tuple[int, FileRecord]]:
-    """Records of the data section with their offsets, from where the stream stands; chunks as they are.
+    """Records of a file with their offsets, from where the stream stands; chunks as they are.
 
-    Raises DamagedRecordError at a truncated or damaged record.
+    The definitions that a summary repeats come too: of a topic without messages they may be all there is.
+
+    Raises DamagedRecordError at a truncated or damaged record before the summary.
     """
     offset = stream.tell()
     size = stream.seek(0, SEEK_END)
+    in_summary = False
     while offset < size:
         try:
             opcode, record, end = _file_record(stream, offset, size)
         except UNREADABLE as error:
+            if in_summary:
+                return
             raise DamagedRecordError(offset, error) from None
-        if opcode in (Opcode.DATA_END, Opcode.FOOTER):
+        if opcode == Opcode.FOOTER:
             return
+        in_summary = in_summary or opcode == Opcode.DATA_END
         if record is not None:
             yield offset, record
         offset = end
