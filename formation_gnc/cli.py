@@ -1,6 +1,7 @@
 """The `formation-gnc` command."""
 
 import argparse
+import io
 import signal
 import sys
 from collections.abc import Sequence
@@ -25,6 +26,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         Exit status: 0 for success, 1 when a run failed, 2 when an input is not allowed, 130 when interrupted.
     """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # what a terminal cannot show
     parser = _Parser(
         prog="formation-gnc",
         description="Fly satellites in formation in software-in-the-loop; analyse, compare and replay the runs.",
@@ -56,3 +60,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     except BrokenPipeError:
         return 1
+    except OSError as error:
+        place = f"{error.filename}: " if error.filename else ""
+        print(f"formation-gnc: {place}{' '.join(str(error.strerror or error).split())}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("formation-gnc: interrupted", file=sys.stderr)
+        return 130

@@ -10,7 +10,6 @@ made with :func:`per_name` holds one nested schema for every name that another f
 import dataclasses
 import json
 import math
-import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass
 from typing import Any, get_args, get_origin, get_type_hints
@@ -18,23 +17,19 @@ from typing import Any, get_args, get_origin, get_type_hints
 import yaml
 
 from formation_gnc.errors import ParameterError, nearest
+from formation_gnc.parameter_yaml import ParameterLoader
 
 OWN_OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides")
 """Prefixes of parameters that every ROS node may have besides its schema."""
 
 
-class _Loader(yaml.SafeLoader):
-    """Reads numbers such as 1e-6, which are text in YAML 1.1, as ROS does."""
-
-
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float", re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$"), list("-+.0123456789")
-)
-
-
 def read_yaml(text: str) -> Any:
-    """Contents of a YAML document of parameters; raises yaml.YAMLError for invalid YAML."""
-    return yaml.load(text, Loader=_Loader)
+    """Contents of a YAML document of parameters, every value as ROS 2 reads it.
+
+    Raises:
+        yaml.YAMLError: invalid YAML, or what ROS 2 refuses, with its line.
+    """
+    return yaml.load(text, Loader=ParameterLoader)
 
 
 @dataclass(frozen=True)

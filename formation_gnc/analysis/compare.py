@@ -9,10 +9,11 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from formation_gnc.analysis.figures import commanded_delta_v, figures
 from formation_gnc.analysis.matplotlib_renderer import draw
-from formation_gnc.analysis.metrics import commanded_delta_v, deputies_of, figures, trajectory
 from formation_gnc.analysis.plot import COLOURS, TIME, Axis, Curve, Plot, Style
 from formation_gnc.analysis.thinning import POINTS
+from formation_gnc.analysis.trajectory import deputies_of, trajectory
 from formation_gnc.flight import topics
 from formation_gnc.recording.reader import Bag
 from formation_gnc.types import Vector

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from formation_gnc.analysis.sensor_series import Channel, SensorSeries
 from formation_gnc.analysis.thinning import Thinned, ThinnedByKey, TickSelection
+from formation_gnc.analysis.trajectory import UnseenThrust
 from formation_gnc.flight import topics
 from formation_gnc.recording.decode import nanoseconds
 from formation_gnc.recording.reader import Fields
@@ -47,21 +48,23 @@ class DeputyHistory:
         solver: (n, 2) time and iterations.
     """
 
-    def __init__(self, index: int, name: str, selection: TickSelection) -> None:
+    def __init__(self, index: int, name: str, selection: TickSelection, unseen: UnseenThrust) -> None:
         """Start empty.
 
         Args:
             index: place of the deputy in Truth.
             name: of the deputy.
             selection: of the ticks to keep.
+            unseen: its thrust over the ticks that truth lacks.
         """
+        self._unseen = unseen
         self.name, self._selection = name, selection
         self._prefix = f"deputies.{index}."
         self._truth = _Columns("relative_state", "acceleration", "delta_v")
         self._estimate, self._target = _Columns("relative_state", "covariance"), _Columns("relative_state")
         self._readings, self._innovations = SensorSeries.of_readings(), SensorSeries.of_innovations()
         self._timing, self._solver = ThinnedByKey[str](2), Thinned(2)
-        self.total_delta_v, self._in_eclipse = 0.0, False
+        self._seen_delta_v, self._in_eclipse = 0.0, False
         self.eclipses: list[list[float]] = []
         self.handlers: dict[str, Handler] = {
             topics.ESTIMATE.name: Handler(self._add_estimate, ("relative_state", "covariance", "innovations")),
@@ -75,9 +78,10 @@ class DeputyHistory:
     def add_truth(self, batch: Fields) -> None:
         """Take the next batch of truths."""
         acceleration = batch[f"{self._prefix}applied_force"] / batch[f"{self._prefix}mass"][:, None]
-        steps = np.abs(acceleration).sum(axis=1) * self._selection.tick_ns * 1e-9
-        total = self.total_delta_v + np.cumsum(steps)
-        self.total_delta_v = float(total[-1])
+        tick = self._selection.tick_ns * 1e-9
+        seen = self._seen_delta_v + np.cumsum(np.abs(acceleration).sum(axis=1) * tick)
+        self._seen_delta_v = float(seen[-1])
+        total = seen + self._unseen.delta_v_until(batch["stamp_ns"], tick)
         columns = {
             "stamp_ns": batch["stamp_ns"],
             "relative_state": batch[f"{self._prefix}relative_state"],
@@ -122,6 +126,8 @@ class DeputyHistory:
         for eclipse in self.eclipses:
             eclipse[1] = min(eclipse[1], end)
         stamps = self._truth["stamp_ns"]
+        unseen = self._unseen.delta_v_until(self._unseen.stamps[-1:], self._selection.tick_ns * 1e-9)
+        self.total_delta_v = self._seen_delta_v + float(unseen.sum())
         self.time: Vector = stamps / 3.6e12
         self.truth: Matrix = self._truth["relative_state"]
         self.acceleration: Matrix = self._truth["acceleration"]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from formation_gnc.analysis.metrics import deputies_of
+from formation_gnc.analysis.trajectory import deputies_of
 from formation_gnc.errors import BagError
 from formation_gnc.flight import topics
 from formation_gnc.recording.reader import Bag, Fields

@@ -8,7 +8,7 @@ from typing import Any
 import plotly.graph_objects as go
 
 from formation_gnc.analysis.figure_table import FIGURES
-from formation_gnc.analysis.metrics import figures, law_at_the_end
+from formation_gnc.analysis.figures import figures, law_at_the_end
 from formation_gnc.analysis.panels.panel import Panel
 from formation_gnc.analysis.panels.registry import DEPUTY_PANELS, FLEET_PANELS
 from formation_gnc.analysis.plot import Plot
@@ -17,6 +17,7 @@ from formation_gnc.analysis.run_history import RunHistory
 from formation_gnc.analysis.timeline import Timeline
 from formation_gnc.flight import topics
 from formation_gnc.recording.reader import Bag
+from formation_gnc.types import NANOSECONDS
 
 _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; margin: 1.5rem auto; max-width: 1280px; padding: 0 1rem; }
@@ -77,14 +78,14 @@ def _figures[H](history: H, panels: Sequence[Panel[H]], timeline: Timeline) -> d
 
 def _summary(run: RunHistory, bag: Bag) -> dict[str, Any]:
     ticks = bag.topics[topics.TRUTH.name].count
-    rows: dict[str, Any] = {"simulated time": f"{ticks * run.tick:g} s", "ticks": ticks}
+    span = (bag.end_ns - bag.start_ns) / NANOSECONDS
+    rows: dict[str, Any] = {"simulated time": f"{span:g} s", "ticks": ticks}
     if run.nearest is not None:
         near = run.nearest
         rows["nearest approach"] = f"{near.distance:.1f} m, {' and '.join(near.pair)} at {near.time:g} s"
     rows |= {f"events: {kind}": count for kind, count in sorted(run.event_counts.items())}
     rows["messages not recorded"] = bag.lost
-    if bag.damage:
-        rows["damage"] = bag.damage
+    rows |= {f"note {number}": remark for number, remark in enumerate(bag.remarks, 1)}
     return rows
 
 

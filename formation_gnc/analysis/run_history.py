@@ -6,13 +6,12 @@ from itertools import combinations, islice
 import numpy as np
 
 from formation_gnc.analysis.deputy_history import HOUR, DeputyHistory, Handler
-from formation_gnc.analysis.metrics import deputies_of
 from formation_gnc.analysis.separation import Separation, minimum_separation
 from formation_gnc.analysis.thinning import ThinnedByKey, TickSelection
 from formation_gnc.analysis.timeline import Mark, Timeline, event_colours
+from formation_gnc.analysis.trajectory import deputies_of, event_kinds, unseen_thrust
 from formation_gnc.flight import topics
 from formation_gnc.recording.reader import Bag, Fields
-from formation_gnc.records import kind_name
 from formation_gnc.types import Matrix
 
 EVENTS = 300
@@ -39,7 +38,9 @@ class RunHistory:
         names = deputies_of(bag)
         selection = TickSelection(bag)
         self.tick = selection.tick_ns * 1e-9
-        self.deputies = {name: DeputyHistory(index, name, selection) for index, name in enumerate(names)}
+        self.deputies = {
+            name: DeputyHistory(index, name, selection, unseen_thrust(bag, name)) for index, name in enumerate(names)
+        }
         self.events: list[Mark] = []
         self.event_counts: Counter[str] = Counter()
         self.nearest: Separation | None = None
@@ -87,8 +88,9 @@ class RunHistory:
             self._distances.add((names[one], names[other]), np.column_stack((batch["time"] / HOUR, distance)))
 
     def _add_events(self, batch: Fields) -> None:
-        kinds = [kind_name(kind) for kind in batch.integers("kind").tolist()]
+        kinds = event_kinds(batch)
         self.event_counts.update(kinds)
-        rows = zip(batch["time"], kinds, batch["node"], batch["subject"], batch["detail"], strict=True)
+        subjects = batch["subject"] if "subject" in batch else [""] * len(kinds)  # none in bags of 0.1.0
+        rows = zip(batch["time"], kinds, batch["node"], subjects, batch["detail"], strict=True)
         for time, kind, *texts in islice(rows, EVENTS - len(self.events)):
             self.events.append(Mark(float(time) / HOUR, kind, *map(str, texts)))

@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
-from formation_gnc.analysis.metrics import deputies_of, has_messages
+from formation_gnc.analysis.trajectory import deputies_of, has_messages
 from formation_gnc.flight import topics
 from formation_gnc.recording.decode import nanoseconds
 from formation_gnc.recording.reader import Bag

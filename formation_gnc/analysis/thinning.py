@@ -1,7 +1,5 @@
 """Curves of bounded length from runs of any length."""
 
-from itertools import islice
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -57,9 +55,8 @@ class TickSelection:
     """
 
     def __init__(self, bag: Bag) -> None:
-        """Derive n from the number of truths and the time between the first two."""
-        first = [stamp for _, _, stamp in islice(bag.messages([topics.TRUTH.name]), 2)]
-        self._start, self.tick_ns = first[0], first[-1] - first[0]
+        """Derive n from the number of truths and the tick."""
+        self._start, self.tick_ns = int(bag.stamps(topics.TRUTH.name)[0]), bag.tick_ns
         self._step = max(1, self.tick_ns * -(-bag.topics[topics.TRUTH.name].count // POINTS))
 
     def __call__(self, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:

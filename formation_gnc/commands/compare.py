@@ -1,7 +1,7 @@
 """Compare recorded runs: their figures side by side, and whether they are identical bit for bit.
 
 Differences are against the first bag. Runs are identical when every message of every GNC topic is; topics of
-wall time do not count.
+wall time do not count. A bag with several runs counts as so many bags.
 """
 
 import argparse
@@ -13,9 +13,10 @@ from rich.console import Console
 
 from formation_gnc.analysis.compare import draw_comparison, gnc_topics, run_figures
 from formation_gnc.analysis.figure_table import FIGURES, RUN_FIGURES
+from formation_gnc.commands.reading import print_remarks, runs_of
 from formation_gnc.commands.tables import print_table
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.recording import Bag, Difference, identical
+from formation_gnc.recording import Difference, identical
 
 RunFigures = dict[str, dict[str, float | str]]
 """Figures by name, by deputy; of the run as a whole by ""."""
@@ -36,18 +37,21 @@ def run(options: argparse.Namespace) -> int:
         raise ConfigurationError("compare: one bag is not allowed; it must be two or more")
     if options.plot is not None and options.plot.suffix not in (".png", ".pdf", ".svg"):
         raise ConfigurationError(f"plot {options.plot}: is not allowed; it must be a .png, .pdf or .svg file")
-    bags = [Bag(path) for path in options.bags]
+    bags = [run for path in options.bags for run in runs_of(path)]
+    labels = [run.path for run in bags]
     figures = [run_figures(bag) for bag in bags]
     differences = [identical(bags[0], other, gnc_topics(bags[0], other)) for other in bags[1:]]
     if options.plot is not None:
         try:
-            draw_comparison(bags, [str(path) for path in options.bags], options.plot)
+            draw_comparison(bags, [str(path) for path in labels], options.plot)
         except OSError as error:
             raise ConfigurationError(f"plot {options.plot}: {error.strerror or error}") from None
     if options.json:
-        print(json.dumps(_summary(options.bags, figures, differences), indent=2))
+        remarks = {str(bag.path): bag.remarks for bag in bags if bag.remarks}
+        print(json.dumps(_summary(labels, figures, differences) | {"remarks": remarks}, indent=2))
     else:
-        _print(options.bags, figures, differences)
+        print_remarks(bags)
+        _print(labels, figures, differences)
     return 0
 
 

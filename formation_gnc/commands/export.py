@@ -1,12 +1,14 @@
 """Export topics of a recorded run as CSV or Parquet, and the files attached to it.
 
 A file per topic, such as `deputy1.estimate.csv` for /deputy1/estimate; a row per message, a column per field
-or array element. In Python, `formation_gnc.recording.read(bag)` returns the same as pandas frames.
+or array element. A bag with several runs gives a file for each. In Python,
+`formation_gnc.recording.read(bag)` returns the same as pandas frames.
 """
 
 import argparse
 from pathlib import Path
 
+from formation_gnc.commands.reading import numbered, print_remarks
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.recording.export import export
 from formation_gnc.recording.reader import Bag
@@ -26,15 +28,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Export the topics and print the paths."""
     bag = Bag(options.bag)
+    print_remarks([bag])
     source = options.bag.absolute()
     directory = options.output or source.with_name(f"{source.stem}_export")
     filled = [name for name, topic in bag.topics.items() if topic.count]
+    wanted = options.topic or [name for name in sorted(filled) if _is_read(bag, name)]
+    if filled and not wanted:
+        raise ConfigurationError(f"{options.bag}: no topic can be exported")
+    runs = bag.runs() if bag.are_told_apart else [bag]
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        for topic in options.topic or sorted(filled):
-            path = directory / f"{topic.strip('/').replace('/', '.')}.{options.format}"
-            export(bag, topic, path)
-            print(f"{topic}: {bag.topics[topic].count} messages in {path}")
+        for number, run in enumerate(runs, 1):
+            for topic in wanted:
+                path = directory / f"{topic.strip('/').replace('/', '.')}.{options.format}"
+                path = numbered(path, number, len(runs))
+                export(run, topic, path)
+                print(f"{topic}: {run.topics[topic].count} messages in {path}")
         for name, data in bag.attachments.items() if options.attachments else ():
             path = directory / Path(name).name
             path.write_bytes(data)
@@ -42,3 +51,11 @@ def run(options: argparse.Namespace) -> int:
     except OSError as error:
         raise ConfigurationError(f"export to {error.filename}: {error.strerror}") from None
     return 0
+
+
+def _is_read(bag: Bag, topic: str) -> bool:
+    """Whether a topic can be decoded; says why not."""
+    reason = bag.unread_reason(topic)
+    if reason:
+        print(f"skipped: {topic}: {reason}")
+    return not reason

@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.table import Table
 
 from formation_gnc.analysis.navigation_figures import NavigationFigures, common_stamps, navigation_figures
+from formation_gnc.commands.reading import print_remarks, runs_of
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
 
@@ -47,11 +48,35 @@ class Comparison:
 
 def run(options: argparse.Namespace) -> int:
     """Replay the navigation of every deputy, compare, print."""
-    from formation_gnc.analysis.metrics import deputies_of
+    bags = runs_of(options.bag)
+    found = [_navigate(bag, options) for bag in bags]
+    if options.json:
+        each = [
+            {
+                "bag": str(options.bag),
+                "deputies": {deputy: asdict(comparison) for deputy, comparison in comparisons.items()},
+                "remarks": bag.remarks,
+            }
+            for bag, comparisons in zip(bags, found, strict=True)
+        ]
+        print(json.dumps(each[0] if len(each) == 1 else {"bag": str(options.bag), "runs": each}, indent=2))
+        return 0
+    print_remarks(bags)
+    console = Console(highlight=False)
+    for bag, comparisons in zip(bags, found, strict=True):
+        for deputy, comparison in comparisons.items():
+            console.print(_table(deputy if len(bags) == 1 else f"{bag.path.name}, {deputy}", comparison))
+            said = "the recorded ones, bit for bit" if comparison.identical else "not the recorded ones"
+            console.print(f"{comparison.now.estimates} estimates: {said}")
+    return 0
+
+
+def _navigate(bag: "Bag", options: argparse.Namespace) -> dict[str, Comparison]:
+    """Replay the navigation of a run; returns a comparison for each deputy that is asked for."""
+    from formation_gnc.analysis.trajectory import deputies_of
     from formation_gnc.recording.reader import Bag
     from formation_gnc.transport.replay_recorder import replay_into
 
-    bag = Bag(options.bag)
     known = deputies_of(bag)
     if options.deputy is not None and options.deputy not in known:
         raise ConfigurationError(f"deputy {options.deputy}: not in {options.bag}; it has {', '.join(known)}")
@@ -59,17 +84,7 @@ def run(options: argparse.Namespace) -> int:
         replayed = Path(directory) / "replay"
         replay_into(bag, replayed, ["navigation"], options.params)
         deputies = [options.deputy] if options.deputy else known
-        comparisons = {deputy: _compare(bag, Bag(replayed), deputy) for deputy in deputies}
-    if options.json:
-        figures = {deputy: asdict(each) for deputy, each in comparisons.items()}
-        print(json.dumps({"bag": str(options.bag), "deputies": figures}, indent=2))
-        return 0
-    console = Console(highlight=False)
-    for deputy, comparison in comparisons.items():
-        console.print(_table(deputy, comparison))
-        said = "the recorded ones, bit for bit" if comparison.identical else "not the recorded ones"
-        console.print(f"{comparison.now.estimates} estimates: {said}")
-    return 0
+        return {deputy: _compare(bag, Bag(replayed), deputy) for deputy in deputies}
 
 
 def _compare(recorded: "Bag", replayed: "Bag", deputy: str) -> Comparison:

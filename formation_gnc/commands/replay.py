@@ -11,6 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from formation_gnc.analysis.compare import gnc_topics
+from formation_gnc.commands.reading import numbered, print_remarks, runs_of
 from formation_gnc.flight.graph import MODULES
 from formation_gnc.recording import Bag, identical
 
@@ -34,11 +35,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Replay, record, compare."""
-    from formation_gnc.transport.replay_recorder import replay_into
-
-    bag = Bag(options.recorded)
+    bags = runs_of(options.recorded)
+    print_remarks(bags)
     source = options.recorded.absolute()
     output = options.bag or source.with_name(f"{source.stem}_replay_{datetime.now(UTC):%Y-%m-%d_%H-%M-%S}")
+    reproduced = [_replay(bag, numbered(output, number, len(bags)), options) for number, bag in enumerate(bags, 1)]
+    if not all(reproduced) and options.params is None:
+        print("formation-gnc: the replay does not give the recorded outputs", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _replay(bag: Bag, output: Path, options: argparse.Namespace) -> bool:
+    """Replay one run and compare; returns whether both are identical."""
+    from formation_gnc.transport.replay_recorder import replay_into
+
     remarks = replay_into(bag, output, options.nodes.split(","), options.params)
     print(f"bag: {output}")
     for remark in remarks:
@@ -49,7 +60,4 @@ def run(options: argparse.Namespace) -> int:
         print(f"differs: {difference}")
     if not differences:
         print("identical on every GNC topic")
-    if differences and options.params is None:
-        print("formation-gnc: the replay does not give the recorded outputs", file=sys.stderr)
-        return 1
-    return 0
+    return not differences

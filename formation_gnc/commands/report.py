@@ -2,13 +2,14 @@
 
 The page works offline. It shows trajectories with a time slider, errors with 3-sigma bounds, measurements
 and innovations, thrust, solver and timing with the events on every time axis, parameters and provenance.
+A bag with several runs gives a page for each.
 """
 
 import argparse
 from pathlib import Path
 
+from formation_gnc.commands.reading import numbered, print_remarks, runs_of
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.recording.reader import Bag
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,19 +25,22 @@ def run(options: argparse.Namespace) -> int:
     from formation_gnc.analysis.report import write_report
     from formation_gnc.analysis.run_history import RunHistory
 
-    bag = Bag(options.bag)
+    bags = runs_of(options.bag)
+    print_remarks(bags)
     title = options.bag.absolute().name
     directory = options.bag if options.bag.is_dir() else options.bag.parent
     page = options.output or directory / "report.html"
-    history = RunHistory(bag)
     try:
-        write_report(bag, history, page, title)
-        print(f"report: {page}")
-        if options.pictures is not None:
-            options.pictures.mkdir(parents=True, exist_ok=True)
-            overview = draw_overview(history, options.pictures / "overview.png", title)
-            for picture in [overview, *draw_panels(history, options.pictures)]:
-                print(f"picture: {picture}")
+        for number, bag in enumerate(bags, 1):
+            history, heading = RunHistory(bag), title if len(bags) == 1 else f"{title}, run {number}"
+            path = write_report(bag, history, numbered(page, number, len(bags)), heading)
+            print(f"report: {path}")
+            if options.pictures is not None:
+                pictures = numbered(options.pictures, number, len(bags))
+                pictures.mkdir(parents=True, exist_ok=True)
+                overview = draw_overview(history, pictures / "overview.png", heading)
+                for picture in [overview, *draw_panels(history, pictures)]:
+                    print(f"picture: {picture}")
     except OSError as error:
         raise ConfigurationError(f"report {error.filename}: {error.strerror or error}") from None
     return 0

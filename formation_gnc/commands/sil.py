@@ -25,7 +25,7 @@ from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import Scenario, duration_of, load_scenario
 
 if TYPE_CHECKING:
-    from formation_gnc.analysis.metrics import RunFigures
+    from formation_gnc.analysis.figures import RunFigures
 
 LOST_STATUS = 3
 """Exit status of a run whose formation is lost."""
@@ -206,7 +206,7 @@ def _fly_in_process(scenario: Scenario, bag: Path, console: Console) -> float:
 
 
 def _summarise(scenario: Scenario, bag: Path, speedup: float, options: argparse.Namespace) -> int:
-    from formation_gnc.analysis.metrics import figures
+    from formation_gnc.analysis.figures import figures
     from formation_gnc.analysis.overview import draw_overview
     from formation_gnc.analysis.run_history import RunHistory
     from formation_gnc.analysis.separation import predicted_approach

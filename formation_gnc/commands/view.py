@@ -9,12 +9,16 @@ import argparse
 import signal
 from pathlib import Path
 
+from formation_gnc.commands.reading import print_remarks
 from formation_gnc.errors import ConfigurationError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     parser.add_argument("--bag", metavar="DIR", type=Path, help="bag to play instead of a running graph")
+    parser.add_argument(
+        "--run", dest="run_number", metavar="N", type=int, default=1, help="which, of a bag with several (default: 1)"
+    )
     parser.add_argument(
         "--rate",
         metavar="X",
@@ -36,7 +40,14 @@ def run(options: argparse.Namespace) -> int:
     from formation_gnc.recording.reader import Bag
     from formation_gnc.transport.viewer import show_graph
 
-    player = LivePlayer(Bag(options.bag), options.port, options.layout, options.rate) if options.bag else None
+    player = None
+    if options.bag:
+        bags = Bag(options.bag).runs()
+        if not 1 <= options.run_number <= len(bags):
+            raise ConfigurationError(f"run {options.run_number}: {options.bag} has runs 1 to {len(bags)}")
+        bag = bags[options.run_number - 1]
+        print_remarks([bag])
+        player = LivePlayer(bag, options.port, options.layout, options.rate)
     view = player.view if player else LiveView("formation_gnc", options.port, options.layout)
     stopped: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):

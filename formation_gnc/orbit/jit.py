@@ -38,8 +38,7 @@ def _cache_directory(folder: str, key: str = "") -> str:
     digest = sha256(key.encode())
     for source in (source for each in SOURCES[folder] for source in sorted((_PACKAGE / each).rglob("*.py"))):
         digest.update(source.read_bytes())
-    user_cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    for root in (numba.config.CACHE_DIR, _PACKAGE / "orbit" / "__pycache__", user_cache / "formation_gnc"):
+    for root in (numba.config.CACHE_DIR, _PACKAGE / "orbit" / "__pycache__", _user_cache() / "formation_gnc"):
         if not root:
             continue
         directory = Path(root) / f"kernels-{digest.hexdigest()[:16]}"
@@ -50,6 +49,14 @@ def _cache_directory(folder: str, key: str = "") -> str:
             continue
         return str(directory)
     return ""
+
+
+def _user_cache() -> Path:
+    """The user's directory for caches; that for temporary files of a user without a home."""
+    try:
+        return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    except RuntimeError:
+        return Path(tempfile.gettempdir()) / f"cache-{os.getuid()}"
 
 
 _directory_for = cache(_cache_directory)

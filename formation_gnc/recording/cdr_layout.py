@@ -73,11 +73,10 @@ class LayoutBuilder:
         """
         for name, (node, detail) in self._definitions[type_name]:
             self._walk(name, node, detail)
-        formats, offsets = zip(*self._fields.values(), strict=True)
         description = {
             "names": list(self._fields),
-            "formats": formats,
-            "offsets": offsets,
+            "formats": [kind for kind, _ in self._fields.values()],
+            "offsets": [offset for _, offset in self._fields.values()],
             "itemsize": len(self._data),
         }
         return CdrLayout(

@@ -5,12 +5,15 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rosbags.interfaces import Nodetype
 from rosbags.serde import SerdeError
-from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
+from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
 
 from formation_gnc.errors import BagError
 from formation_gnc.recording.cdr_layout import CdrLayout, FieldDefinition, LayoutBuilder, MisfitError
 from formation_gnc.types import NANOSECONDS
+
+HEADER, TIME, CLOCK = "std_msgs/msg/Header", "builtin_interfaces/msg/Time", "rosgraph_msgs/msg/Clock"
 
 LAYOUTS_KEPT = 64
 """Layouts kept for each message length; free text gives ever new ones."""
@@ -26,12 +29,14 @@ class MessageType:
     def __init__(self, name: str, schema: bytes, encoding: str) -> None:
         """Parse the definition."""
         self.name = name
-        if encoding != "ros2msg":
-            raise BagError(f"message type {name!r}: schema encoding {encoding!r} is not allowed; it must be ros2msg")
+        parsers = {"ros2msg": lambda text: get_types_from_msg(text, name), "ros2idl": get_types_from_idl}
+        if encoding not in parsers:
+            allowed = " or ".join(parsers)
+            raise BagError(f"message type {name!r}: schema encoding {encoding!r} is not allowed; it must be {allowed}")
         self._layouts: dict[tuple[bytes, int], list[CdrLayout]] = {}
         self._store = get_typestore(Stores.EMPTY)
         try:
-            self._store.register(get_types_from_msg(schema.decode(), name))
+            self._store.register(parsers[encoding](schema.decode()))
             self._definitions: dict[str, Sequence[FieldDefinition]] = {
                 type_name: fields for type_name, (_, fields) in self._store.fielddefs.items()
             }
@@ -39,6 +44,13 @@ class MessageType:
                 raise KeyError(name)
         except (TypesysError, UnicodeDecodeError, KeyError, ValueError) as error:
             raise BagError(f"message type {name!r}: its schema cannot be read: {error}") from None
+
+    @property
+    def is_stamped(self) -> bool:
+        """Whether its messages begin with a stamp: that of a header, or of the clock."""
+        first = self._definitions[self.name][:1]
+        kinds = {detail for _, (node, detail) in first if node == Nodetype.NAME}
+        return HEADER in kinds or (self.name == CLOCK and TIME in kinds)
 
     def has_fields_of(self, other: "MessageType") -> bool:
         """Whether both have the same name and fields, nested ones included; constants do not count."""

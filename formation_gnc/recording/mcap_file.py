@@ -1,10 +1,8 @@
-"""Reader of one MCAP file, chunk by chunk: by its index, or after a scan when it was never finished."""
+"""Reader of one MCAP file by its data section: what its summary leaves out or has wrong does not matter."""
 
 import struct
 import zlib
-from collections import Counter
-from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterator, Mapping
 from io import SEEK_END, BytesIO
 from pathlib import Path
 from typing import BinaryIO
@@ -14,11 +12,12 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile, McapError
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
-from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader, get_chunk_data_stream
+from mcap.records import Attachment, Channel, Chunk, Message, Metadata, Schema
+from mcap.stream_reader import get_chunk_data_stream
 from mcap.summary import Summary
 
 from formation_gnc.errors import BagError
+from formation_gnc.recording.stored_file import Series, Span, StoredFile
 
 MAGIC = b"\x89MCAP0\r\n"
 UNREADABLE = (
@@ -36,80 +35,35 @@ UNREADABLE = (
 _RECORD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
 _FOOTER = struct.Struct("<BQQQI")
+_PRIVATE = 0x80  # first opcode of others' records
+
+FileRecord = Message | Schema | Channel | Chunk | Metadata | Attachment
 
 
-@dataclass(frozen=True)
-class Span:
-    """Part of a file that is read at once: a chunk, or a whole file with messages outside chunks."""
+class DamagedRecordError(McapError):
+    """A record that is cut or damaged, at an offset in the file."""
 
-    offset: int | None
-    """Byte at which the chunk begins; None for the whole file."""
-    start: int
-    """First stamp, ns."""
-    end: int
-    """Last stamp, ns."""
+    def __init__(self, offset: int, reason: Exception) -> None:
+        """Name the reason, or its kind where it has no words."""
+        super().__init__(str(reason) or type(reason).__name__)
+        self.offset = offset
 
 
-class McapFile:
-    """Reader of one MCAP file in bounded memory.
-
-    Attributes:
-        schemas, channels: records by id.
-        counts: number of messages by channel id.
-        spans: in file order.
-        metadata, attachments: by name, the last of each.
-        damage: None for a finished file, else the reason why it ends early; everything before is read.
+class McapFile(StoredFile):
+    """One MCAP file.
 
     Raises:
-        BagError: the file cannot be opened or is no MCAP file, or, while reading, a chunk is damaged.
+        BagError: the file cannot be opened, is no MCAP file, or was finished and is damaged.
     """
 
-    def __init__(self, path: Path) -> None:
-        """Read the index, or scan a file that has none."""
-        self.path = path
-        self.schemas: dict[int, Schema] = {}
-        self.channels: dict[int, Channel] = {}
-        self.counts: Counter[int] = Counter()
-        self.spans: list[Span] = []
-        self.metadata: dict[str, dict[str, str]] = {}
-        self.attachments: dict[str, bytes] = {}
-        self.damage: str | None = None
+    def __init__(self, path: Path, unpack: Callable[[bytes], bytes] | None = None) -> None:
+        """Scan the file."""
+        super().__init__(path, unpack)
+        self._schemas: dict[int, Schema] = {}
         with self._open() as stream:
             if stream.read(len(MAGIC)) != MAGIC:
                 raise BagError(f"{path}: is not an MCAP file")
-            summary = verified_summary(stream)
-            if summary is not None:
-                self._read_index(summary, stream)
-            else:
-                self._scan(stream)
-
-    def messages(
-        self, channels: Collection[int] | None = None, start_ns: int = 0, end_ns: int = 2**64
-    ) -> Iterator[Message]:
-        """Messages of some channels (None: all) with start_ns <= stamp < end_ns, in file order."""
-        for span in self.spans:
-            if span.end >= start_ns and span.start < end_ns:
-                for message in self.span_messages(span, channels):
-                    if start_ns <= message.log_time < end_ns:
-                        yield message
-
-    def span_messages(self, span: Span, channels: Collection[int] | None = None) -> Iterator[Message]:
-        """Messages of some channels (None: all) in one span, in file order."""
-        with self._open() as stream:
-            try:
-                if span.offset is None:
-                    records: Iterator[McapRecord] = StreamReader(stream, validate_crcs=True).records
-                else:
-                    stream.seek(span.offset + _RECORD.size)
-                    records = chunk_records(chunk_content(Chunk.read(ReadDataStream(stream))), channels)
-                for record in records:
-                    if isinstance(record, Message) and (channels is None or record.channel_id in channels):
-                        yield record
-            except UNREADABLE as error:
-                if self.damage is None or span.offset is not None:
-                    raise BagError(
-                        f"{self.path}: damaged in the chunk at byte {span.offset} ({error}); recover it first"
-                    ) from None
+            self._scan(stream)
 
     def _open(self) -> BinaryIO:
         try:
@@ -117,56 +71,131 @@ class McapFile:
         except OSError as error:
             raise BagError(f"{self.path}: cannot be read: {error.strerror}") from None
 
-    def _read_index(self, summary: Summary, stream: BinaryIO) -> None:
-        self.schemas, self.channels = summary.schemas, summary.channels
-        assert summary.statistics is not None
-        self.counts.update(summary.statistics.channel_message_counts)
-        self.spans = [
-            Span(index.chunk_start_offset, index.message_start_time, index.message_end_time)
-            for index in sorted(summary.chunk_indexes, key=lambda index: index.chunk_start_offset)
-        ]
-        stream.seek(0)
-        reader = make_reader(stream)
-        try:
-            self.metadata = {record.name: record.metadata for record in reader.iter_metadata()}
-            self.attachments = {record.name: record.data for record in reader.iter_attachments()}
-        except UNREADABLE as error:
-            raise BagError(f"{self.path}: metadata or attachments damaged ({error}); recover the bag first") from None
-
     def _scan(self, stream: BinaryIO) -> None:
-        size = stream.seek(0, SEEK_END)
-        stream.seek(0)
-        offset = 0
-        first, last = 2**64, -1  # stamps outside chunks
+        outside = Span(None)
+        is_finished = _is_finished(stream)
         try:
-            for record in StreamReader(stream, emit_chunks=True, record_size_limit=size).records:
+            for offset, record in file_records(stream):
                 if isinstance(record, Chunk):
-                    for inner in list(chunk_records(chunk_content(record))):  # all or none of a damaged one
-                        self._add(inner)
-                    self.spans.append(Span(offset, record.message_start_time, record.message_end_time))
+                    records = _unpacked(record, offset)
+                    span = self._begin_span(offset)
+                    for inner in records:
+                        self._add(inner, span)
                 else:
-                    self._add(record)
-                    if isinstance(record, Message):
-                        first, last = min(first, record.log_time), max(last, record.log_time)
-                offset = stream.tell()
-        except UNREADABLE as error:
-            self.damage = f"{self.path}: cut or damaged at byte {offset} ({type(error).__name__}: {error})"
-        if last >= 0:
-            spans = [*self.spans, Span(None, first, last)]
-            self.spans = [Span(None, min(span.start for span in spans), max(span.end for span in spans))]
+                    self._add(record, outside)
+        except DamagedRecordError as error:
+            if is_finished:
+                raise self._damaged(error.offset, f"({error})") from None
+            self.damage = f"{self.path}: cut or damaged at byte {error.offset} ({error})"
+        if not is_finished and self.damage is None:
+            self.damage = f"{self.path}: cut: it was not closed, what came last may be missing"
+        if outside.start <= outside.end:
+            ends = [*self.spans, outside]
+            self.spans = [Span(None, min(span.start for span in ends), max(span.end for span in ends))]
 
-    def _add(self, record: McapRecord) -> None:
+    def _add(self, record: FileRecord, span: Span) -> None:
         match record:
             case Message():
-                self.counts[record.channel_id] += 1
+                self._note(span, record.channel_id, record.data, record.log_time)
             case Schema():
-                self.schemas[record.id] = record
+                self._schemas.setdefault(record.id, record)
             case Channel():
-                self.channels[record.id] = record
+                self._define(self._schemas.get(record.schema_id), record)
             case Metadata():
                 self.metadata[record.name] = record.metadata
             case Attachment():
                 self.attachments[record.name] = record.data
+
+    def _span_records(self, span: Span, channels: Mapping[int, Series]) -> Iterator[tuple[int, bytes, int]]:
+        with self._open() as stream:
+            try:
+                for record in self._messages(stream, span, channels):
+                    if isinstance(record, Message) and record.channel_id in channels:
+                        yield record.channel_id, self._unpack(record.data), record.sequence
+            except UNREADABLE as error:
+                if self.damage is None or span.offset is not None:
+                    raise self._damaged(span.offset, f"({error})") from None
+
+    def _damaged(self, offset: int | None, reason: str) -> BagError:
+        return BagError(f"{self.path}: damaged in the chunk at byte {offset} {reason}; recover it first")
+
+    @staticmethod
+    def _messages(stream: BinaryIO, span: Span, channels: Collection[int]) -> Iterator[FileRecord]:
+        if span.offset is not None:
+            stream.seek(span.offset + _RECORD.size)
+            yield from chunk_records(chunk_content(Chunk.read(ReadDataStream(stream))), channels)
+            return
+        stream.seek(len(MAGIC))
+        for offset, record in file_records(stream):
+            if isinstance(record, Chunk):
+                yield from _unpacked(record, offset)
+            else:
+                yield record
+
+
+def file_records(stream: BinaryIO) -> Iterator[tuple[int, FileRecord]]:
+    """Records of a file with their offsets, from where the stream stands; chunks as they are.
+
+    The definitions that a summary repeats come too: of a topic without messages they may be all there is.
+
+    Raises DamagedRecordError at a truncated or damaged record before the summary.
+    """
+    offset = stream.tell()
+    size = stream.seek(0, SEEK_END)
+    in_summary = False
+    while offset < size:
+        try:
+            opcode, record, end = _file_record(stream, offset, size)
+        except UNREADABLE as error:
+            if in_summary:
+                return
+            raise DamagedRecordError(offset, error) from None
+        if opcode == Opcode.FOOTER:
+            return
+        in_summary = in_summary or opcode == Opcode.DATA_END
+        if record is not None:
+            yield offset, record
+        offset = end
+
+
+def _file_record(stream: BinaryIO, offset: int, size: int) -> tuple[int, FileRecord | None, int]:
+    """Opcode, record (None for one that is passed over) and end of what begins at an offset of a file."""
+    readers: dict[int, Callable[[ReadDataStream], FileRecord]] = {
+        Opcode.SCHEMA: Schema.read,
+        Opcode.CHANNEL: Channel.read,
+        Opcode.CHUNK: Chunk.read,
+        Opcode.METADATA: Metadata.read,
+        Opcode.ATTACHMENT: Attachment.read,
+    }
+    stream.seek(offset)
+    opcode, length = _RECORD.unpack(stream.read(_RECORD.size))
+    end = offset + _RECORD.size + length
+    if end > size:
+        raise EOFError("the file ends within a record")
+    if opcode == Opcode.MESSAGE:
+        return opcode, next(chunk_records(_RECORD.pack(opcode, length) + stream.read(length))), end
+    if opcode in readers:
+        return opcode, readers[opcode](ReadDataStream(BytesIO(stream.read(length)))), end
+    if opcode < _PRIVATE and opcode not in list(Opcode):
+        raise ValueError(f"record of unknown kind {opcode}")
+    return opcode, None, end
+
+
+def _unpacked(chunk: Chunk, offset: int) -> list[Message | Schema | Channel]:
+    """All records of a chunk at an offset of a file; raises DamagedRecordError."""
+    try:
+        return list(chunk_records(chunk_content(chunk)))
+    except UNREADABLE as error:
+        raise DamagedRecordError(offset, error) from None
+
+
+def _is_finished(stream: BinaryIO) -> bool:
+    """Whether a file ends as a closed one does; leaves the stream behind the first magic bytes."""
+    size = stream.seek(0, SEEK_END)
+    stream.seek(max(0, size - len(MAGIC) - _FOOTER.size))
+    end = stream.read()
+    stream.seek(len(MAGIC))
+    return end[:1] == bytes([Opcode.FOOTER]) and end[-len(MAGIC) :] == MAGIC
 
 
 def verified_summary(stream: BinaryIO) -> Summary | None:
@@ -233,7 +262,7 @@ def mcap_files(path: Path) -> list[Path]:
         BagError: there is no such bag, or its directory holds no .mcap file.
     """
     if path.is_dir():
-        files = sorted(path.glob("*.mcap"), key=lambda file: (_number(file.stem), file.name))
+        files = sorted(path.glob("*.mcap"), key=lambda file: (file_number(file.stem), file.name))
         if not files:
             raise BagError(f"{path}: holds no .mcap file")
         return files
@@ -242,6 +271,7 @@ def mcap_files(path: Path) -> list[Path]:
     return [path]
 
 
-def _number(stem: str) -> int:
+def file_number(stem: str) -> int:
+    """Number at the end of a file's name; -1 for none."""
     digits = stem.rpartition("_")[2]
     return int(digits) if digits.isdecimal() else -1

@@ -79,7 +79,7 @@ class TickPlayer:
         if not parameters.bag:
             raise ParameterError("parameter bag: missing; give a bag to play")
         self._parameters, self._play = parameters, play
-        self.bag = Bag(parameters.bag)
+        self.bag = Bag(parameters.bag).runs()[0]
         measured = [topics.MEASUREMENT.of(deputy) for deputy in topics.deputies_in(self.bag.topics)]
         default = [*measured, *(name for name in self.bag.topics if name == topics.TRUTH.name)]
         self.topics = [name for name in parameters.topics or default if name != topics.CLOCK.name]

@@ -2,6 +2,7 @@
 
 import heapq
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from itertools import count, groupby, takewhile
 from operator import itemgetter
@@ -13,9 +14,13 @@ from mcap.records import Channel, Schema
 from numpy.typing import NDArray
 
 from formation_gnc.errors import BagError, ConfigurationError
+from formation_gnc.flight import topics as run_topics
+from formation_gnc.recording.completeness import gaps, tick_of
+from formation_gnc.recording.contents import BagContents, BagMessage, own_type, unread_reason
 from formation_gnc.recording.decode import MessageType, installed_type
-from formation_gnc.recording.mcap_file import McapFile, mcap_files
+from formation_gnc.recording.order import RunOrder, pacing_topic
 from formation_gnc.recording.provenance import LOST
+from formation_gnc.recording.stored_file import OWN_PACKAGE, type_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,45 +68,113 @@ class Fields(Arrays):
 
 
 class Bag:
-    """A recorded bag: a directory of MCAP files as rosbag2 lays them out, or one .mcap file.
+    """A recorded bag: a directory of MCAP or sqlite3 files as rosbag2 lays them out, or one such file.
 
-    Stamps are simulated time, ns.
+    Stamps are simulated time, ns: those in the headers of messages. Messages of the project that were recorded
+    twice count once, and those of each topic come in order of stamp.
 
     Attributes:
         topics: by name.
         metadata: MCAP metadata records by name, the provenance of the run among them.
         attachments: files carried in the bag, by name.
         start_ns, end_ns: first and last stamp; 0 and 0 when empty.
+        tick_ns: time between ticks, ns; 0 when it is not known.
         damage: None, or the reason why the bag ends early, when its recorder could not finish it; everything
             before is read as usual.
         lost: number of messages that the recorder knows to have missed.
+        remarks: what is damaged, missing, left out, doubled or out of order, one line each.
 
     Raises:
-        BagError: here or while reading, when the path is missing, holds no MCAP file, or is damaged.
+        BagError: here or while reading, when the path is missing, holds no bag, or is damaged.
     """
 
     def __init__(self, path: str | Path) -> None:
         """Open a bag by its directory or file."""
         self.path = Path(path)
-        self._files = [McapFile(file) for file in mcap_files(self.path)]
-        self.metadata = {name: data for file in self._files for name, data in file.metadata.items()}
-        self.metadata.pop("rosbag2", None)  # rosbag2's own copy of metadata.yaml
-        self.attachments = {name: data for file in self._files for name, data in file.attachments.items()}
-        self.lost = sum(int(count) for count in self.metadata.get(LOST, {}).values())
-        self.damage = next((file.damage for file in self._files if file.damage), None)
-        spans = [span for file in self._files for span in file.spans]
-        self.start_ns = min((span.start for span in spans), default=0)
-        self.end_ns = max((span.end for span in spans), default=0)
-        self.topics: dict[str, Topic] = {}
-        self._definitions: dict[str, tuple[Schema | None, Channel]] = {}
-        self._types: dict[str, MessageType] = {}
-        for file in self._files:
-            for channel in file.channels.values():
-                schema = file.schemas.get(channel.schema_id)
-                self._definitions.setdefault(channel.topic, (schema, channel))
-                known = self.topics.get(channel.topic)
-                count = file.counts[channel.id] + (known.count if known else 0)
-                self.topics[channel.topic] = Topic(channel.topic, schema.name if schema else "", count)
+        self._contents = contents = BagContents(self.path)
+        self.metadata, self.attachments, self.damage = contents.metadata, contents.attachments, contents.damage
+        self.lost = sum(int(count) for count in self.metadata.get(LOST, {}).values() if count.isdecimal())
+        self._error: BagError | None = None
+        self._orders: list[RunOrder] = []
+        try:
+            self._orders = contents.orders
+        except BagError as error:
+            self._error = error
+        self._select(self._orders[0] if len(self._orders) == 1 else None)
+
+    def _select(self, run: RunOrder | None) -> None:
+        """Read the rows of one run; None for all as they are."""
+        contents = self._contents
+        self._rows: dict[str, NDArray[np.int64]] = dict(run.rows) if run else {}
+        self.topics = {
+            name: Topic(name, series.type_name, len(self._rows[name]) if name in self._rows else contents.count(name))
+            for name, series in contents.series.items()
+        }
+        own = [name for name, series in contents.series.items() if series.is_own and self.topics[name].count]
+        spans = [(int(each.min()), int(each.max())) for each in map(self.stamps, own or self._filled)]
+        self.start_ns = min((first for first, _ in spans), default=0)
+        self.end_ns = max((last for _, last in spans), default=0)
+        counts = {name: self.topics[name].count for name in own}
+        pace = pacing_topic(counts)
+        self.tick_ns = tick_of(self.metadata, self.stamps(pace)) if pace else 0
+        self._run_remarks = [*(run.remarks if run else ()), *gaps(counts, self.stamps, self.tick_ns)]
+
+    @property
+    def _filled(self) -> list[str]:
+        return [name for name, topic in self.topics.items() if topic.count]
+
+    @property
+    def remarks(self) -> list[str]:
+        """What is damaged, missing, left out, doubled or out of order, one line each."""
+        lines = [*self._contents.remarks]
+        if len(self._orders) > 1:
+            lines.append(f"{len(self._orders)} runs are in it, one after the other")
+        if self._error is not None:
+            lines.append(str(self._error))
+        return [*lines, *self._run_remarks]
+
+    @property
+    def are_told_apart(self) -> bool:
+        """Whether runs, where there are several, can be told apart."""
+        return self._error is None
+
+    def runs(self) -> "list[Bag]":
+        """The runs in the bag, one after the other; usually one, the bag itself.
+
+        Raises:
+            BagError: runs that are mixed and cannot be told apart.
+        """
+        if self._error is not None:
+            raise self._error
+        if len(self._orders) < 2:
+            return [self]
+        runs = []
+        for number, order in enumerate(self._orders, 1):
+            run = copy(self)
+            run.path = self.path.with_name(f"{self.path.name} run {number}")
+            run._orders = [order]
+            run._select(order)
+            runs.append(run)
+        return runs
+
+    def check_own_types(self) -> None:
+        """Raise BagError for a topic by a name of the run's that is of another type."""
+        own = [name for name, topic in self.topics.items() if topic.type_name.startswith(OWN_PACKAGE)]
+        spaces = {"", *map(run_topics.deputy_of, own)}
+        for name, topic in self.topics.items():
+            expected = own_type(name)
+            if topic.count and expected and run_topics.deputy_of(name) in spaces and topic.type_name != expected:
+                has = topic.type_name or "unknown"
+                raise BagError(f"{self.path}: topic {name} is of another type, {has}; it must be {expected}")
+
+    def stamps(self, topic: str) -> NDArray[np.int64]:
+        """Stamps (ns) of a topic, in order unless the bag has several runs."""
+        stamps = self._contents.stamps(topic)
+        return stamps[self._rows[topic]] if topic in self._rows else stamps
+
+    def unread_reason(self, topic: str) -> str:
+        """Why messages of a topic cannot be decoded; empty when they can."""
+        return unread_reason(self._contents.series[topic])
 
     def messages(
         self, topics: Sequence[str] | None = None, start_ns: int = 0, end_ns: int = 2**64
@@ -113,11 +186,23 @@ class Bag:
             start_ns: first stamp.
             end_ns: stamp before which to end.
         """
-        wanted = self._known(topics)
-        for file in self._files:
-            names = {id: channel.topic for id, channel in file.channels.items() if channel.topic in wanted}
-            for message in file.messages(names.keys(), start_ns, end_ns):
-                yield names[message.channel_id], message.data, message.log_time
+        for message in self._messages(self._known(topics), start_ns, end_ns):
+            yield message.topic, message.data, message.stamp
+
+    def _messages(self, wanted: Collection[str], start_ns: int = 0, end_ns: int = 2**64) -> Iterator[BagMessage]:
+        ranks = {topic: self._rank(topic) for topic in wanted if topic in self._rows}
+        for number, span in self._contents.spans():
+            if span.end >= start_ns and span.start < end_ns:
+                for message in self._contents.span_messages(number, span, wanted):
+                    rank = ranks.get(message.topic)
+                    if start_ns <= message.stamp < end_ns and (rank is None or rank[message.row] >= 0):
+                        yield message
+
+    def _rank(self, topic: str) -> NDArray[np.int64]:
+        """Place of each row in order of stamp; -1 for one that is left out."""
+        rank = np.full(self._contents.count(topic), -1, dtype=np.int64)
+        rank[self._rows[topic]] = np.arange(len(self._rows[topic]))
+        return rank
 
     def decoded(
         self, topics: Sequence[str] | None = None, start_ns: int = 0, end_ns: int = 2**64
@@ -127,7 +212,7 @@ class Bag:
             yield topic, self.message_type(topic).message(data), stamp
 
     def arrays(self, topic: str, fields: Collection[str] | None = None) -> Fields:
-        """All messages of a topic: an array per field, a row per message in recorded order.
+        """All messages of a topic: an array per field, a row per message in order of stamp.
 
         "stamp_ns" is the stamp (int64, ns), "time" the same in s; then the fields of the message as in
         `MessageType.arrays`.
@@ -136,14 +221,23 @@ class Bag:
             topic: full name.
             fields: of the message, with what is nested in them; None for all.
         """
-        return self._as_arrays(topic, [(data, stamp) for _, data, stamp in self.messages([topic])], fields)
+        return self._as_arrays(topic, self._in_order(topic, list(self._messages(self._known([topic])))), fields)
+
+    def _in_order(self, topic: str, messages: list[BagMessage]) -> list[BagMessage]:
+        if self._is_in_order(topic):
+            return messages
+        rank = self._rank(topic)
+        return sorted(messages, key=lambda message: int(rank[message.row]))
+
+    def _is_in_order(self, topic: str) -> bool:
+        return topic not in self._rows or bool(np.all(np.diff(self._rows[topic]) > 0))
 
     def batches(
         self, topics: Sequence[str], size: int = 1024, fields: Mapping[str, Collection[str]] | None = None
     ) -> Iterator[tuple[str, Fields]]:
         """Messages as (topic, `arrays` of some of them) in one pass, for bags of any length.
 
-        Those of each topic come in recorded order.
+        Those of each topic come in order of stamp; one that was recorded out of order is held in memory.
 
         Args:
             topics: full names.
@@ -151,42 +245,47 @@ class Bag:
             fields: of the messages by topic, as for `arrays`; all of a topic without an entry.
         """
         wanted = fields or {}
-        waiting: dict[str, list[tuple[bytes, int]]] = {topic: [] for topic in topics}
-        for topic, data, stamp in self.messages(topics):
+        waiting: dict[str, list[BagMessage]] = {topic: [] for topic in topics}
+        streamed = {topic for topic in topics if self._is_in_order(topic)}
+        for message in self._messages(self._known(topics)):
+            topic = message.topic
             rows = waiting[topic]
-            rows.append((data, stamp))
-            if len(rows) == size:
+            rows.append(message)
+            if len(rows) == size and topic in streamed:
                 waiting[topic] = []
                 yield topic, self._as_arrays(topic, rows, wanted.get(topic))
         for topic, rows in waiting.items():
-            if rows:
-                yield topic, self._as_arrays(topic, rows, wanted.get(topic))
+            ordered = self._in_order(topic, rows)
+            for start in range(0, len(rows), size):
+                yield topic, self._as_arrays(topic, ordered[start : start + size], wanted.get(topic))
 
-    def _as_arrays(self, topic: str, rows: list[tuple[bytes, int]], fields: Collection[str] | None) -> Fields:
-        stamps = np.array([stamp for _, stamp in rows], dtype=np.int64)
-        arrays = self.message_type(topic).arrays([data for data, _ in rows], fields)
+    def _as_arrays(self, topic: str, rows: list[BagMessage], fields: Collection[str] | None) -> Fields:
+        beyond = any(row.stamp >= 2**63 for row in rows)
+        stamps = np.array([row.stamp for row in rows], dtype=np.uint64 if beyond else np.int64)
+        arrays = self.message_type(topic).arrays([row.data for row in rows], fields)
         return Fields(f"{self.path}: topic {topic}", {"stamp_ns": stamps, "time": stamps * 1e-9, **arrays})
 
     def by_stamp(self, topics: Sequence[str]) -> Iterator[tuple[int, str, list[bytes]]]:
         """Canonical messages by (stamp, topic), sorted, also among those of one stamp and topic.
 
-        Independent of the order in which processes answered. Holds in memory only messages that a later
-        chunk may still precede.
+        Independent of the order in which processes answered. Messages that cannot be decoded come as they are.
+        Holds in memory only messages that a later chunk may still precede.
         """
         wanted = self._known(topics)
-        channels = {file: {id for id, each in file.channels.items() if each.topic in wanted} for file in self._files}
-        spans = [(file, span) for file in self._files for span in file.spans]
+        kinds = {topic: None if self.unread_reason(topic) else self.message_type(topic) for topic in wanted}
+        ranks = {topic: self._rank(topic) for topic in wanted if topic in self._rows}
+        spans = self._contents.spans()
         settled = [2**64]  # by span: every later message has at least this stamp
         for _, span in reversed(spans[1:]):
             settled.append(min(settled[-1], span.start))
         waiting: list[tuple[int, str, bytes]] = []
 
         def in_order() -> Iterator[tuple[int, str, bytes]]:
-            for (file, span), limit in zip(spans, reversed(settled), strict=False):
-                for message in file.span_messages(span, channels[file]):
-                    topic = file.channels[message.channel_id].topic
-                    data = self.message_type(topic).canonical(message.data)
-                    heapq.heappush(waiting, (message.log_time, topic, data))
+            for (number, span), limit in zip(spans, reversed(settled), strict=False):
+                for topic, row, stamp, data, _ in self._contents.span_messages(number, span, wanted):
+                    if topic not in ranks or ranks[topic][row] >= 0:
+                        kind = kinds[topic]
+                        heapq.heappush(waiting, (stamp, topic, kind.canonical(data) if kind else data))
                 while waiting and waiting[0][0] < limit:
                     yield heapq.heappop(waiting)
 
@@ -196,33 +295,29 @@ class Bag:
     def restarts(self, topics: Sequence[str]) -> dict[str, set[int]]:
         """Stamps (ns), by topic, of messages with which a publisher restarted its count."""
         found: dict[str, set[int]] = {topic: set() for topic in topics}
-        seen: set[str] = set()
-        for file in self._files:
-            names = {id: channel.topic for id, channel in file.channels.items() if channel.topic in found}
-            for message in file.messages(names.keys()):
-                topic = names[message.channel_id]
-                if message.sequence == 1 and topic in seen:
-                    found[topic].add(message.log_time)
-                seen.add(topic)
+        latest: dict[str, int] = {}
+        for message in self._messages([topic for topic in topics if topic in self.topics]):
+            if message.sequence == 1 and latest.get(message.topic, 1) != 1:
+                found[message.topic].add(message.stamp)
+            latest[message.topic] = message.sequence
         return found
 
     def definition(self, topic: str) -> tuple[Schema | None, Channel]:
         """MCAP schema (None: there is none) and channel record of a topic, from the first file with it."""
         self._known([topic])
-        return self._definitions[topic]
+        return self._contents.definition(topic)
 
     def message_type(self, topic: str) -> MessageType:
-        """Type of a topic's messages, by the definition in the bag.
+        """Type of a topic's messages, by the definition in the bag, or the installed one where it has none.
 
         Raises:
-            BagError: it has none, or its messages are not CDR.
+            BagError: it cannot be decoded.
         """
-        if topic not in self._types:
-            schema, channel = self.definition(topic)
-            if schema is None or channel.message_encoding != "cdr":
-                raise BagError(f"{self.path}: topic {topic} has no message definition, or is not CDR")
-            self._types[topic] = MessageType(schema.name, schema.data, schema.encoding)
-        return self._types[topic]
+        self._known([topic])
+        try:
+            return type_of(self._contents.series[topic])
+        except BagError as error:
+            raise BagError(f"{self.path}: topic {topic}: {error}") from None
 
     def check_type(self, topic: str) -> None:
         """Raise BagError when a topic was recorded with other fields than the installed type has."""

@@ -1,13 +1,14 @@
 """Recovery of bags that were cut or damaged."""
 
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import yaml
 from mcap.records import Attachment, Channel, Message, MessageIndex, Metadata, Schema
 from mcap.summary import Summary
 
+from formation_gnc.recording.files import missing_files
 from formation_gnc.recording.mcap_file import mcap_files, verified_summary
 from formation_gnc.recording.salvage import Group, SalvageReader
 from formation_gnc.recording.topic_definition import TopicDefinition
@@ -46,7 +47,7 @@ def recover(path: Path, output: Path) -> Recovery:
         BagError: the bag does not exist, or the output does.
     """
     surveys = [_surveyed(file) for file in mcap_files(path)]
-    reasons = tuple(reason for survey in surveys for reason in survey.reasons) + _missing_files(path)
+    reasons = tuple(reason for survey in surveys for reason in survey.reasons) + tuple(missing_files(path))
     saved = sum(survey.saved.total() for survey in surveys)
     lost: Counter[str] = Counter()
     for survey in surveys:
@@ -55,6 +56,8 @@ def recover(path: Path, output: Path) -> Recovery:
         return Recovery(NOTHING_SAVED, None, 0, dict(lost), reasons or (f"{path}: holds no message",))
     if not reasons and all(survey.indexed for survey in surveys):
         return Recovery(WHOLE, None, saved, {}, ())
+    reasons += tuple(_leave_out_other_types(surveys, lost))
+    saved = sum(survey.saved.total() for survey in surveys)
     _write(surveys, output, {"source": str(path), "lost": str(dict(lost)), "reasons": "\n".join(reasons)})
     return Recovery(PARTLY_LOST if reasons else WHOLE, output, saved, dict(lost), reasons)
 
@@ -90,7 +93,7 @@ class _Survey:
             self.lost[channel.topic if channel else f"channel {channel_id}"] += count
         for channel_id, count in found.items():
             channel = self.channels.get(channel_id)
-            if channel is not None and channel.schema_id in self.schemas:
+            if channel is not None and (not channel.schema_id or channel.schema_id in self.schemas):
                 self.saved[channel_id] = count
             else:
                 self.lost[f"channel {channel_id}"] += count
@@ -123,6 +126,7 @@ def _surveyed(path: Path) -> _Survey:
                 case Attachment():
                     survey.attachments[record.name] = record.data
         survey.reasons = reader.reasons
+        survey.indexed = survey.indexed and not reader.has_wrong_lengths
     survey.count(found, _missing(summary, found, missing))
     return survey
 
@@ -132,6 +136,20 @@ def _missing(summary: Summary | None, found: Counter[int], indexed: Counter[int]
     if summary is None or summary.statistics is None:
         return indexed
     return Counter(summary.statistics.channel_message_counts) - found
+
+
+def _leave_out_other_types(surveys: list[_Survey], lost: Counter[str]) -> Iterator[str]:
+    """Leave out messages of another type than the first of their topic, since a new bag has one; yields a line each."""
+    types: dict[str, tuple[str, bytes]] = {}
+    for survey in surveys:
+        for channel in survey.channels.values():
+            schema = survey.schemas.get(channel.schema_id)
+            kind = (schema.name, schema.data) if schema else ("", b"")
+            count = survey.saved[channel.id]
+            if count and types.setdefault(channel.topic, kind) != kind:
+                del survey.saved[channel.id]
+                lost[channel.topic] += count
+                yield f"{survey.path}: topic {channel.topic} has messages of a second type, {kind[0] or 'unknown'}"
 
 
 def _write(surveys: list[_Survey], output: Path, report: dict[str, str]) -> None:
@@ -144,9 +162,9 @@ def _write(surveys: list[_Survey], output: Path, report: dict[str, str]) -> None
         for survey in surveys:
             for channel in survey.channels.values():
                 schema = survey.schemas.get(channel.schema_id)
-                if schema is not None and channel.topic not in added:
+                if (schema is not None or not channel.schema_id) and channel.topic not in added:
                     added.add(channel.topic)
-                    writer.add_defined_topic(channel.topic, _definition(schema, channel))
+                    writer.add_defined_topic(channel.topic, TopicDefinition.recorded(schema, channel))
             _copy_messages(survey, writer)
 
 
@@ -157,22 +175,3 @@ def _copy_messages(survey: _Survey, writer: BagWriter) -> None:
                 if isinstance(item, Message) and item.channel_id in survey.saved:
                     topic = survey.channels[item.channel_id].topic
                     writer.write(topic, item.data, item.log_time, item.sequence)
-
-
-def _definition(schema: Schema, channel: Channel) -> TopicDefinition:
-    metadata = dict(channel.metadata)
-    try:
-        yaml.safe_load(metadata.get("offered_qos_profiles", ""))
-    except yaml.YAMLError:
-        del metadata["offered_qos_profiles"]
-    return TopicDefinition(schema.name, schema.data, schema.encoding, channel.message_encoding, metadata)
-
-
-def _missing_files(path: Path) -> tuple[str, ...]:
-    """A line for each file that the bag's metadata.yaml lists and the directory lacks."""
-    try:
-        listed = yaml.safe_load((path / "metadata.yaml").read_text(encoding="utf-8"))
-        names = [str(name) for name in listed["rosbag2_bagfile_information"]["relative_file_paths"]]
-    except (OSError, ValueError, KeyError, TypeError, yaml.YAMLError):
-        return ()
-    return tuple(f"{path / name}: is missing" for name in names if not (path / name).exists())

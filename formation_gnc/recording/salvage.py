@@ -5,8 +5,10 @@ import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from io import SEEK_END, BytesIO
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
+import lz4.frame
+import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
@@ -22,15 +24,17 @@ from mcap.records import (
     Metadata,
     Schema,
 )
+from numpy.typing import NDArray
 
 from formation_gnc.recording.mcap_file import MAGIC, UNREADABLE, chunk_content, chunk_records
 
 _RECORD = struct.Struct("<BQ")
 _CHUNK = struct.Struct("<QQQII")  # first and last stamp, size, checksum, length of the compression's name
 _COMPRESSIONS = (b"\x04\0\0\0zstd", b"\x03\0\0\0lz4")  # as they stand in a chunk
+_HEAD = _RECORD.size + _CHUNK.size + 8  # bytes of a plain chunk before its records
 _SEARCH_BLOCK = 1 << 20  # bytes searched at a time
 _LARGEST_RECORD = 1 << 30  # bytes; a longer one is a damaged length
-_ZSTD_BLOCK = 1 << 9  # bytes of a damaged chunk decompressed at a time
+_BLOCK = 1 << 9  # bytes of a damaged chunk decompressed at a time
 _READERS: dict[int, Callable[[ReadDataStream], McapRecord]] = {
     Opcode.HEADER: Header.read,
     Opcode.SCHEMA: Schema.read,
@@ -56,11 +60,13 @@ class SalvageReader:
 
     Attributes:
         reasons: what is damaged, one line each; complete once all records were read.
+        has_wrong_lengths: whether a chunk was read whose length is wrong, which other readers cannot.
     """
 
     def __init__(self, stream: BinaryIO) -> None:
         """Read an open file; `stream.name` is its name in `reasons`."""
         self.reasons: list[str] = []
+        self.has_wrong_lengths = False
         self._stream = stream
         self._size = stream.seek(0, SEEK_END)
 
@@ -125,22 +131,19 @@ class SalvageReader:
     def _next_chunk(self, offset: int) -> int:
         """Offset of the first chunk from `offset` on, noting what is skipped; the file's size for none."""
         found = self._find_chunk(offset)
-        if found != offset:
+        if found == offset:
+            self.has_wrong_lengths = True
+        else:
             self._note(f"bytes {offset} to {found} cannot be read")
         return found
 
     def _find_chunk(self, offset: int) -> int:
-        """Offset of the first chunk from `offset` on, by its compression's name; the file's size for none."""
-        name_at = _RECORD.size + _CHUNK.size - 4
-        start = offset + name_at
-        while start < self._size:
+        """Offset of the first chunk from `offset` on; the file's size for none."""
+        for start in range(offset, self._size, _SEARCH_BLOCK):
             self._stream.seek(start)
-            block = self._stream.read(_SEARCH_BLOCK + 8)
-            hits = [block.find(name) for name in _COMPRESSIONS]
-            found = min((hit for hit in hits if hit >= 0), default=-1)
-            if found >= 0:
-                return start + found - name_at
-            start += _SEARCH_BLOCK
+            found = first_chunk(self._stream.read(_SEARCH_BLOCK + _HEAD))
+            if found is not None:
+                return start + found
         return self._size
 
     def _chunk_at(self, offset: int) -> tuple[Chunk, int]:
@@ -152,10 +155,13 @@ class SalvageReader:
         stream.seek(offset)
         _, length = _RECORD.unpack(stream.read(_RECORD.size))
         start, end, uncompressed_size, checksum, name_length = _CHUNK.unpack(stream.read(_CHUNK.size))
-        compression = stream.read(name_length).decode()
+        compression = stream.read(name_length).decode(errors="replace")
         data_length = int.from_bytes(stream.read(8), "little")
         data_at = stream.tell()
-        for stop in (data_at + data_length, offset + _RECORD.size + length):
+        ends = [data_at + data_length, offset + _RECORD.size + length]
+        if not compression:
+            ends.append(data_at + uncompressed_size)
+        for stop in ends:
             if data_at <= stop <= self._size and (stop == self._size or self._record_at(stop)[0] is not None):
                 break
         else:
@@ -205,13 +211,55 @@ def _parsed(opcode: int, body: bytes) -> McapRecord | None:
 
 def _decompressed(chunk: Chunk) -> bytes:
     """Content of a damaged chunk up to the damage."""
-    if chunk.compression != "zstd":
-        return chunk.data if not chunk.compression else b""
+    if not chunk.compression:
+        return chunk.data
+    if chunk.compression == "zstd":
+        decompress = zstandard.ZstdDecompressor().decompressobj().decompress
+    elif chunk.compression == "lz4":
+        decompress = lz4.frame.LZ4FrameDecompressor().decompress
+    else:
+        return b""
     content = b""
-    decompressor = zstandard.ZstdDecompressor().decompressobj()
     try:
-        for start in range(0, len(chunk.data), _ZSTD_BLOCK):
-            content += decompressor.decompress(chunk.data[start : start + _ZSTD_BLOCK])
-    except zstandard.ZstdError:
-        pass
+        for start in range(0, len(chunk.data), _BLOCK):
+            content += decompress(chunk.data[start : start + _BLOCK])
+    except (zstandard.ZstdError, RuntimeError, EOFError):
+        pass  # the readable part ends here
     return content
+
+
+def first_chunk(block: bytes) -> int | None:
+    """Offset of the first chunk that begins in a block, by what its header repeats; None for none.
+
+    A compressed one is known by its compression's name. One of no compression has its length thrice: in the
+    record, as size of its content, and before its content; two that agree are enough where the opcode stands.
+    """
+    name_at = _RECORD.size + _CHUNK.size - 4
+    hits = [block.find(name, name_at) - name_at for name in _COMPRESSIONS]
+    plain = _first_plain_chunk(block)
+    return min((hit for hit in (*hits, -1 if plain is None else plain) if hit >= 0), default=None)
+
+
+def _first_plain_chunk(block: bytes) -> int | None:
+    count = len(block) - _HEAD + 1
+    if count < 1:
+        return None
+
+    def field(offset: int, kind: str) -> NDArray[Any]:
+        """A field of the chunks that might begin at each byte."""
+        return np.ndarray((count,), kind, block, offset, (1,))
+
+    length, size, content = field(1, "<u8"), field(25, "<u8"), field(41, "<u8")
+    inner = np.uint64(_HEAD - _RECORD.size)
+    agreeing = (size == content).astype(np.int8) + (length == size + inner) + (length == content + inner)
+    plausible = (
+        (field(37, "<u4") == 0)
+        & (field(9, "<u8") <= field(17, "<u8"))
+        & (np.maximum(size, content) > 0)
+        & (agreeing >= np.where(field(0, "u1") == int(Opcode.CHUNK), 1, 3))
+    )
+    for found in np.flatnonzero(plausible).tolist():
+        first = block[found + _HEAD : found + _HEAD + 1]
+        if not first or first[0] in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
+            return int(found)
+    return None

@@ -4,6 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Self
 
+import yaml
+from mcap.records import Channel, Schema
+
 from formation_gnc.errors import BagError
 from formation_gnc.recording.schema import schema_text, type_hash
 
@@ -23,13 +26,27 @@ _OFFERED_QOS = f"""\
 
 @dataclass(frozen=True)
 class TopicDefinition:
-    """Message type of a topic, the type's definition, and rosbag2's channel metadata."""
+    """Message type of a topic, the type's definition, and rosbag2's channel metadata.
+
+    All of the schema is empty where there is none, as JSON may do without.
+    """
 
     type_name: str
     schema: bytes
     schema_encoding: str = "ros2msg"
     message_encoding: str = "cdr"
     metadata: Mapping[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def recorded(cls, schema: Schema | None, channel: Channel) -> Self:
+        """Definition by an MCAP file's records; QoS profiles that are no YAML are left out."""
+        metadata = dict(channel.metadata)
+        try:
+            yaml.safe_load(metadata.get("offered_qos_profiles", ""))
+        except yaml.YAMLError:
+            del metadata["offered_qos_profiles"]
+        name, text, encoding = (schema.name, schema.data, schema.encoding) if schema else ("", b"", "")
+        return cls(name, text, encoding, channel.message_encoding, metadata)
 
     @classmethod
     def installed(cls, type_name: str, depth: int) -> Self:

@@ -50,8 +50,8 @@ class _OpenFile:
     entry: FileEntry
     overhead: int = 0
     """Bytes before the first message."""
-    schemas: dict[str, int] = field(default_factory=dict)
-    """Schema ids by message type."""
+    schemas: dict[tuple[str, str, bytes], int] = field(default_factory=dict)
+    """Schema ids by message type, encoding and text."""
     channels: dict[str, int] = field(default_factory=dict)
     """Channel ids by topic."""
 
@@ -234,10 +234,10 @@ class BagWriter:
     def _register(self, topic: str, definition: TopicDefinition) -> None:
         """Give the topic a channel in the current file."""
         file = self._file
-        schema = file.schemas.get(definition.type_name)
+        known = definition.type_name, definition.schema_encoding, definition.schema
+        schema = file.schemas.get(known) if any(known) else 0
         if schema is None:
-            schema = file.mcap.register_schema(definition.type_name, definition.schema_encoding, definition.schema)
-            file.schemas[definition.type_name] = schema
+            schema = file.schemas[known] = file.mcap.register_schema(*known)
         metadata = dict(definition.metadata)
         file.channels[topic] = file.mcap.register_channel(topic, definition.message_encoding, schema, metadata)
 

@@ -1,10 +1,12 @@
 """One scenario file per run: a standard ROS 2 parameter file, read as every node would read it."""
 
+import difflib
 import math
 import os
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,14 @@ from formation_gnc.parameters import dump, load, read_yaml
 from formation_gnc.plant.parameters import PlantParameters
 
 SECTION = "ros__parameters"
+
+RUN_NODES = ("/plant", "/recorder", "/display", "/replay")
+"""Nodes that are one per run, some only when asked."""
+
+DEFAULT_DEPUTIES = next(field.default for field in fields(PlantParameters) if field.name == "deputies")
+
+MOST_NAMED = 12
+"""Nodes that an error names at most."""
 
 NODE = re.compile(r"/?([A-Za-z0-9_]+|\*\*?)(/([A-Za-z0-9_]+|\*\*?))*")
 """Names of nodes and patterns of them that ROS takes in a parameter file."""
@@ -68,6 +78,8 @@ def load_scenario(name: str, overrides: Mapping[str, Mapping[str, Any]] | None =
     """
     path = find_scenario(name)
     sections = [*_sections(path), *(overrides or {}).items()]
+    listed = _given(sections, "/plant").get("deputies", DEFAULT_DEPUTIES)
+    _check_sections(path, listed if isinstance(listed, list | tuple) else ())
     try:
         plant = _load(PlantParameters, sections, "/plant")
         deputies = {
@@ -95,13 +107,34 @@ def find_scenario(name: str) -> Path:
     raise ConfigurationError(f"scenario {name}: unknown; it must be a parameter file or one of {', '.join(known)}")
 
 
-def given_to(path: Path, node: str) -> dict[str, Any]:
-    """What a parameter file gives a node, by dotted name.
+def given_to(path: Path, node: str, deputies: Sequence[str]) -> dict[str, Any]:
+    """What a parameter file gives a node of a run with these deputies, by dotted name.
 
     Raises:
-        ConfigurationError: the file cannot be read, or is no ROS 2 parameter file.
+        ConfigurationError: the file cannot be read, is no ROS 2 parameter file, or has a section of no node.
     """
+    _check_sections(path, deputies)
     return _given(_sections(path), node)
+
+
+def _check_sections(path: Path, deputies: Sequence[Any]) -> None:
+    """Raise ConfigurationError for a section that means no node of a run with these deputies."""
+    modules = [f"/{deputy}/{row.name}" for deputy in deputies for row in GRAPH]
+    nodes = [*RUN_NODES, *modules]
+    patterns = [*nodes, *(f"/**/{row.name}" for row in GRAPH)]
+    unknown = [
+        f"{pattern} (did you mean {_nearest(pattern, patterns)}?)"
+        for pattern, _ in _sections(path)
+        if not any(_matches(pattern, node) for node in nodes)
+    ]
+    if unknown:
+        names = ", ".join(nodes if len(nodes) <= MOST_NAMED else [*nodes[:MOST_NAMED], "..."])
+        raise ConfigurationError(f"{path}: sections of no node: {', '.join(unknown)}; the run has {names}")
+
+
+def _nearest(pattern: str, patterns: Sequence[str]) -> str:
+    """The known pattern most like one."""
+    return difflib.get_close_matches(f"/{pattern.strip('/')}", patterns, n=1, cutoff=0.0)[0]
 
 
 def _directories() -> Iterator[Path]:
@@ -143,7 +176,8 @@ def _sections(path: Path) -> list[tuple[str, Mapping[str, Any]]]:
     except OSError as error:
         raise ConfigurationError(f"{path}: cannot be read ({error.strerror})") from None
     except (yaml.YAMLError, ValueError) as error:  # undecodable text, or a date that there is not
-        raise ConfigurationError(f"{path}: not YAML ({' '.join(str(error).split())})") from None
+        reason = " ".join(str(error).split())
+        raise ConfigurationError(f"{path}: not YAML as ROS 2 reads it ({reason})") from None
     if not isinstance(document, dict):
         raise ConfigurationError(f"{path}: not a ROS 2 parameter file; it must map node names to {SECTION}")
     return list(_walk(path, document, ""))
@@ -155,7 +189,11 @@ def _walk(path: Path, tree: Mapping[str, Any], prefix: str) -> Iterator[tuple[st
         if not isinstance(value, dict):
             raise ConfigurationError(f"{path}: {name} is not a section; it must map to {SECTION}")
         if key == SECTION and prefix:
-            yield prefix, dict(_flatten(value))
+            values = list(_flatten(value))
+            twice = [name for name, count in Counter(name for name, _ in values).items() if count > 1]
+            if twice:
+                raise ConfigurationError(f"{path}: {prefix}: parameter {twice[0]} is given twice")
+            yield prefix, dict(values)
         elif NODE.fullmatch(name):
             yield from _walk(path, value, name)
         else:

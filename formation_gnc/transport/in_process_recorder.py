@@ -29,12 +29,7 @@ class InProcessRecorder:
     def copy(self, source: Bag, topic: str, data: bytes, time: int) -> None:
         """Write a message of another bag as it is."""
         if topic not in self._counts:
-            schema, channel = source.definition(topic)
-            assert schema is not None, "a bag gives canonical messages of defined topics only"
-            definition = TopicDefinition(
-                schema.name, schema.data, schema.encoding, channel.message_encoding, channel.metadata
-            )
-            self._bag.add_defined_topic(topic, definition)
+            self._bag.add_defined_topic(topic, TopicDefinition.recorded(*source.definition(topic)))
         self._append(topic, data, time)
 
     def _append(self, topic: str, data: bytes, time: int) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from formation_gnc.flight import topics
 from formation_gnc.parameters import to_json
 from formation_gnc.recording.provenance import parameters_record, provenance
 from formation_gnc.recording.reader import Bag
@@ -29,8 +30,9 @@ def replay_into(bag: Bag, output: Path, modules: Sequence[str], parameter_file: 
         ConfigurationError: no such module, parameters that cannot be flown, or a directory that exists.
     """
     parameters: dict[str, Mapping[str, Any]] = {}
+    deputies = topics.deputies_in(bag.topics)
     for node in nodes_of(bag, modules):
-        changes = given_to(parameter_file, node) if parameter_file else {}
+        changes = given_to(parameter_file, node, deputies) if parameter_file else {}
         parameters[node] = parameters_of(bag, node) | changes
     flown = {
         parameters_record(node): {name: to_json(value) for name, value in values.items()}

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from formation_gnc.analysis.metrics import figures
+from formation_gnc.analysis.figures import figures
 from formation_gnc.analysis.report import write_report
 from formation_gnc.analysis.run_history import RunHistory
 from formation_gnc.recording.reader import Bag

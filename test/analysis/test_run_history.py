@@ -5,11 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from formation_gnc.analysis.metrics import deputies_of, figures, trajectory
+from formation_gnc.analysis.figures import figures
 from formation_gnc.analysis.run_history import RunHistory
 from formation_gnc.analysis.separation import minimum_separation
 from formation_gnc.analysis.thinning import POINTS, Thinned
 from formation_gnc.analysis.timeline import Mark
+from formation_gnc.analysis.trajectory import deputies_of, trajectory
 from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.sil.runner import Run

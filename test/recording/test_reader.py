@@ -272,7 +272,7 @@ def test_files_of_other_recorders_are_read(tmp_path, flight, compression, chunke
         schema = writer.register_schema("rosgraph_msgs/msg/Clock", "ros2msg", b"builtin_interfaces/Time clock\n")
         channel = writer.register_channel("/clock", "cdr", schema)
         for stamp in (3, 1, 2):
-            writer.add_message(channel, stamp, flight[0].data, stamp)
+            writer.add_message(channel, stamp, b"\0\1\0\0" + struct.pack("<iI", 0, stamp), stamp)
         writer.finish()
     bag = Bag(path)
     assert bag.damage is None

@@ -1,61 +1,16 @@
 """Figures of merit of a recorded run."""
 
 from dataclasses import asdict, dataclass
-from math import sqrt, tau
 
 import numpy as np
 from scipy.stats import chi2
 
+from formation_gnc.analysis.trajectory import deputies_of, event_kinds, has_messages, trajectory
 from formation_gnc.analysis.verdict import ErrorHistory, Verdict
-from formation_gnc.errors import BagError
 from formation_gnc.flight import topics
-from formation_gnc.orbit.constants import MU
 from formation_gnc.recording.reader import Bag, Fields
-from formation_gnc.records import EventKind
-from formation_gnc.types import Matrix, Vector
-
-
-@dataclass(frozen=True)
-class Trajectory:
-    """States of one deputy at the ticks that all of its modules answered."""
-
-    time: Vector
-    """(N,) simulated time, s."""
-    truth: Matrix
-    """(N, 6) true relative states, Hill frame, m and m/s."""
-    estimate: Matrix
-    """(N, 6) estimated relative states."""
-    sigma: Matrix
-    """(N, 6) standard deviations from the covariance of the filter."""
-    target: Matrix
-    """(N, 6) target states."""
-    nis: Vector
-    """(N,) normalised innovation squared; 0 on ticks without readings."""
-    innovations: Vector
-    """(N,) number of scalar innovations used at the tick."""
-    applied: Matrix
-    """(M, 3) accelerations by thrust over each tick of the truth, Hill frame, m/s^2."""
-    applied_time: Vector
-    """(M,) start of each of those ticks, s."""
-    tick: float
-    """Length of a tick, s."""
-    period: float
-    """Period of the chief's orbit at the start, s."""
-
-    @property
-    def error(self) -> Matrix:
-        """(N, 3) true position minus target, m."""
-        return self.truth[:, :3] - self.target[:, :3]
-
-    @property
-    def estimation_error(self) -> Matrix:
-        """(N, 6) estimate minus truth."""
-        return self.estimate - self.truth
-
-    @property
-    def delta_v(self) -> Vector:
-        """(3,) delta-v per Hill axis, m/s."""
-        return np.asarray(np.abs(self.applied).sum(axis=0) * self.tick)
+from formation_gnc.records import EventKind, kind_name
+from formation_gnc.types import Vector
 
 
 @dataclass(frozen=True)
@@ -106,77 +61,6 @@ class RunFigures:
         return max((each.verdict for each in self.deputies.values()), key=list(Verdict).index)
 
 
-def has_messages(bag: Bag, topic: str) -> bool:
-    """Whether a bag has a message of a topic."""
-    return topic in bag.topics and bag.topics[topic].count > 0
-
-
-def deputies_of(bag: Bag) -> list[str]:
-    """Names of the deputies in a bag, in the order of its truth.
-
-    Raises:
-        BagError: no truth.
-    """
-    if not has_messages(bag, topics.TRUTH.name):
-        raise BagError(f"{bag.path}: has no truth")
-    _, first = next(bag.batches([topics.TRUTH.name], 1))
-    count = sum(key.endswith(".name") for key in first)
-    return [str(first[f"deputies.{index}.name"][0]) for index in range(count)]
-
-
-def trajectory(bag: Bag, deputy: str) -> Trajectory:
-    """Trajectory of one deputy.
-
-    Raises:
-        BagError: no truth, or no tick with an estimate and a target of this deputy.
-    """
-    truth = bag.arrays(topics.TRUTH.name, ("chief_state", "deputies"))
-    index = deputies_of(bag).index(deputy)
-    missing = [topic.name for topic in (topics.ESTIMATE, topics.TARGET) if topic.of(deputy) not in bag.topics]
-    if missing:
-        raise BagError(f"{bag.path}: has no {' and no '.join(missing)} of {deputy}")
-    estimate = bag.arrays(topics.ESTIMATE.of(deputy), ("relative_state", "covariance", "nis", "innovations"))
-    target = bag.arrays(topics.TARGET.of(deputy), ("relative_state",))
-    stamps = np.intersect1d(np.intersect1d(truth["stamp_ns"], estimate["stamp_ns"]), target["stamp_ns"])
-    if not len(stamps):
-        raise BagError(f"{bag.path}: no tick with an estimate and a target of {deputy}")
-    rows = {id(part): np.searchsorted(part["stamp_ns"], stamps) for part in (truth, estimate, target)}
-    prefix = f"deputies.{index}."
-    time = truth["time"]
-    tick = float(time[1] - time[0]) if len(time) > 1 else 0.0
-    covariance = estimate["covariance"][rows[id(estimate)]].reshape(-1, 6, 6)
-    return Trajectory(
-        time=stamps * 1e-9,
-        truth=truth[f"{prefix}relative_state"][rows[id(truth)]],
-        estimate=estimate["relative_state"][rows[id(estimate)]],
-        sigma=np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)),
-        target=target["relative_state"][rows[id(target)]],
-        nis=estimate["nis"][rows[id(estimate)]],
-        innovations=_used_innovations(estimate)[rows[id(estimate)]],
-        # Truth holds the force of the tick before.
-        applied=(truth[f"{prefix}applied_force"] / truth[f"{prefix}mass"][:, None])[1:],
-        applied_time=time[:-1],
-        tick=tick,
-        period=_period(truth["chief_state"][0]),
-    )
-
-
-def _used_innovations(estimates: Fields) -> Vector:
-    """(N,) number of scalar innovations that passed all checks, by estimate."""
-    used = np.zeros(len(estimates["time"]))
-    for element in estimates.elements("innovations"):
-        sizes = [0 if values is None else len(values) for values in estimates[f"{element}.values"]]
-        used += np.where(estimates[f"{element}.rejection"] == "", sizes, 0)
-    return used
-
-
-def _period(chief: Vector) -> float:
-    """Period (s) of the two-body orbit through an inertial state."""
-    radius, speed = float(np.linalg.norm(chief[:3])), float(np.linalg.norm(chief[3:]))
-    axis = 1.0 / (2.0 / radius - speed**2 / MU)
-    return tau * sqrt(axis**3 / MU)
-
-
 def commanded_delta_v(bag: Bag, deputy: str) -> tuple[Vector, Vector]:
     """Delta-v that the controller commanded, whether or not it was applied.
 
@@ -189,8 +73,7 @@ def commanded_delta_v(bag: Bag, deputy: str) -> tuple[Vector, Vector]:
     thrust, truth = bag.arrays(topic, ("force",)), bag.arrays(topics.TRUTH.name, ("deputies",))
     prefix = f"deputies.{deputies_of(bag).index(deputy)}."
     mass = np.interp(thrust["time"], truth["time"], truth[f"{prefix}mass"])
-    tick = float(truth["time"][1] - truth["time"][0]) if len(truth["time"]) > 1 else 0.0
-    return thrust["time"], np.cumsum(np.abs(thrust["force"]).sum(axis=1) / mass) * tick
+    return thrust["time"], np.cumsum(np.abs(thrust["force"]).sum(axis=1) / mass) * bag.tick_ns * 1e-9
 
 
 def figures(bag: Bag) -> RunFigures:
@@ -201,7 +84,7 @@ def figures(bag: Bag) -> RunFigures:
     """
     events = bag.arrays(topics.EVENTS.name, ("kind", "node")) if has_messages(bag, topics.EVENTS.name) else None
     deputies = {name: _deputy_figures(bag, name, events) for name in deputies_of(bag)}
-    misses = 0 if events is None else int(np.count_nonzero(events.integers("kind") == EventKind.MISS))
+    misses = 0 if events is None else event_kinds(events).count(kind_name(EventKind.MISS))
     return RunFigures(bag.topics[topics.TRUTH.name].count, misses, deputies)
 
 
@@ -246,7 +129,7 @@ def _times_of(events: Fields | None, deputy: str, *kinds: EventKind) -> Vector:
     if events is None:
         return np.zeros(0)
     own = np.array([str(node).startswith(f"/{deputy}/") for node in events["node"]])
-    return np.asarray(events["time"][own & np.isin(events.integers("kind"), kinds)])
+    return np.asarray(events["time"][own & np.isin(event_kinds(events), [kind_name(kind) for kind in kinds])])
 
 
 def _limits_met(bag: Bag, deputy: str) -> tuple[float, int]:

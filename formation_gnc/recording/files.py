@@ -1,0 +1,98 @@
+"""Files of a bag: MCAP or sqlite3, plain or compressed as rosbag2 does it, in one directory or alone."""
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import yaml
+import zstandard
+
+from formation_gnc.errors import BagError
+from formation_gnc.recording.mcap_file import McapFile, file_number
+from formation_gnc.recording.sqlite_file import SqliteFile
+from formation_gnc.recording.stored_file import StoredFile
+
+COMPRESSED = ".zstd"
+READERS: dict[str, type[StoredFile]] = {".mcap": McapFile, ".db3": SqliteFile}
+"""By suffix of the file."""
+
+_SQLITE = b"SQLite format 3\0"
+_ZSTD = b"\x28\xb5\x2f\xfd"
+
+
+def bag_files(path: Path) -> list[Path]:
+    """Files of a bag (a directory or a single file) in order of the number at the end of their names.
+
+    Raises:
+        BagError: there is no such bag, or its directory holds no file of one.
+    """
+    if not path.is_dir():
+        if not path.exists():
+            raise BagError(f"{path}: no such bag")
+        return [path]
+    files = [file for file in path.iterdir() if Path(file.name.removesuffix(COMPRESSED)).suffix in READERS]
+    if not files:
+        raise BagError(f"{path}: holds no .mcap or .db3 file")
+    return sorted(files, key=lambda file: (file_number(file.name.partition(".")[0]), file.name))
+
+
+def missing_files(path: Path) -> list[str]:
+    """A line for each file that the bag's metadata.yaml lists and the directory lacks."""
+    names = _metadata(path).get("relative_file_paths")
+    listed = [Path(str(name)).name for name in names] if isinstance(names, list) else []
+    return [f"{path / name}: is missing" for name in listed if not (path / name).exists()]
+
+
+def open_files(path: Path) -> list[StoredFile]:
+    """Open all files of a bag.
+
+    Raises:
+        BagError: there is no such bag, or one of its files cannot be read.
+    """
+    information = _metadata(path)
+    unpack = _decompressed if str(information.get("compression_mode", "")).upper() == "MESSAGE" else None
+    return [_open(file, unpack) for file in bag_files(path)]
+
+
+def _open(path: Path, unpack: Callable[[bytes], bytes] | None) -> StoredFile:
+    try:
+        with path.open("rb") as stream:
+            start = stream.read(len(_SQLITE))
+    except OSError as error:
+        raise BagError(f"{path}: cannot be read: {error.strerror}") from None
+    if start.startswith(_ZSTD):
+        return _unpacked(path, unpack)
+    if start == _SQLITE and path.suffix != ".db3":
+        raise BagError(f"{path}: is a sqlite3 file; name it .db3")
+    return (SqliteFile if path.suffix == ".db3" else McapFile)(path, unpack)
+
+
+def _unpacked(path: Path, unpack: Callable[[bytes], bytes] | None) -> StoredFile:
+    """Open a file that is compressed as a whole, from a copy that lasts as long as what is returned."""
+    directory = tempfile.TemporaryDirectory(prefix="formation_gnc-")
+    copy = Path(directory.name) / path.name.removesuffix(COMPRESSED)
+    try:
+        with path.open("rb") as source, copy.open("wb") as target:
+            zstandard.ZstdDecompressor().copy_stream(source, target)
+    except zstandard.ZstdError as error:
+        raise BagError(f"{path}: cannot be decompressed ({error})") from None
+    except OSError as error:
+        raise BagError(f"{path}: cannot be unpacked to {directory.name}: {error.strerror}") from None
+    file = _open(copy, unpack)
+    file.copy = directory
+    return file
+
+
+def _decompressed(data: bytes) -> bytes:
+    return zstandard.ZstdDecompressor().decompressobj().decompress(data)
+
+
+def _metadata(path: Path) -> dict[str, Any]:
+    """What the bag's metadata.yaml says; empty where there is none that can be read."""
+    try:
+        document = yaml.safe_load((path / "metadata.yaml").read_text(encoding="utf-8"))
+    except (OSError, ValueError, yaml.YAMLError):
+        return {}
+    information = document.get("rosbag2_bagfile_information") if isinstance(document, dict) else None
+    return information if isinstance(information, dict) else {}
