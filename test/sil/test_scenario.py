@@ -111,8 +111,8 @@ def test_a_pattern_means_the_nodes_that_it_means_to_ros(
     [
         *("1", "-7", "+4", "0x10", "010", "1.0", "1.", ".5", "1e-6", "-1E+3", "1.5e3", ".inf"),
         *("true", "off", "'1'", "word", "[1, 2]", "[1.0, 2e-3]", "[a, b]", "[true, false]"),
-        *("1_00.0", "1:00.0", "2024-01-01", "08", "0b11", "0o17", "y", "N", "~", "null", "1e400", "0x1p3", "infinity"),
-        *("12345678901234567890", "['1', b]", "1,000", "<<", "=", "1.0f"),
+        *("1_00.0", "2024-01-01", "08", "0b11", "0o17", "y", "N", "~", "null", "1e400", "0x1p3", "infinity"),
+        *("12345678901234567890", "['1', b]", "<<", "=", "1.0f"),
     ],
 )
 def test_a_value_is_to_us_what_it_is_to_ros(
@@ -218,7 +218,7 @@ def test_the_good_file_that_the_bad_ones_are_made_from_is_good(write: Write) -> 
         (
             "7.0e6",
             "7.0e400",
-            "/plant: parameter chief.semi_major_axis: inf is not allowed; it must be finite",
+            "/plant: parameter chief.semi_major_axis: '7.0e400' is not allowed; it must be a value of type double",
         ),
         ("deputy1:", "deputy2:", "/plant: parameter deputy2.relative_state: unknown; did you mean deputy1."),
         ("/plant:", "/x: {y: 3}\n/plant:", "/x/y is not a section; it must map to ros__parameters"),
