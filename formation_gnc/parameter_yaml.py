@@ -26,7 +26,7 @@ class ParameterLoader(yaml.SafeLoader):
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         """Compose a node; rejects aliases."""
         if self.check_event(yaml.AliasEvent):
-            _reject(self.peek_event().start_mark, "aliases are not allowed")
+            _reject(self.peek_event().start_mark, "aliases are not allowed")  # type: ignore[no-untyped-call]
         return super().compose_node(parent, index)
 
 

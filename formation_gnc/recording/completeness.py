@@ -28,7 +28,7 @@ def tick_of(metadata: Mapping[str, Mapping[str, str]], stamps: Stamps) -> int:
         metadata: of the bag.
         stamps: (N,) ns, sorted, of a topic with a message at every tick.
     """
-    steps = np.diff(np.unique(stamps))
+    steps = np.diff(np.unique(stamps)).astype(np.int64)
     try:
         tick = round(float(json.loads(metadata[parameters_record("/plant")]["tick"])) * NANOSECONDS)
     except (KeyError, ValueError, TypeError, OverflowError):
