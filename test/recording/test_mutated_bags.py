@@ -48,6 +48,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, tuple[
         found = [
             (channel.topic, schema.name, schema.data, message.data, message.log_time)
             for schema, channel, message in reader.iter_messages()
+            if schema is not None
         ]
         metadata = {record.name: dict(record.metadata) for record in reader.iter_metadata()}
     kinds = {topic: (name, text) for topic, name, text, _, _ in found}
@@ -57,6 +58,8 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, tuple[
 def changed(data: Any, message: tuple[str, bytes, int], topics: list[str]) -> list[tuple[str, bytes, int]]:
     """What a message becomes."""
     topic, content, stamp = message
+    if not content:
+        return []
     at = data.draw(st.integers(0, len(content) - 1))
     flipped = content[:at] + bytes([content[at] ^ data.draw(st.integers(1, 255))]) + content[at + 1 :]
     kind = data.draw(st.sampled_from(["drop", "twice", "flip", "cut", "long", "topic", "stamp", "empty", "sequence"]))
