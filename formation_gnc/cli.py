@@ -2,10 +2,13 @@
 
 import argparse
 import io
+import os
 import signal
 import sys
+import tempfile
 from collections.abc import Sequence
 from importlib import import_module
+from pathlib import Path
 from typing import NoReturn
 
 from formation_gnc import __version__
@@ -20,15 +23,26 @@ class _Parser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {message}; see `{self.prog} --help`\n")
 
 
+def _prepare_environment() -> None:
+    """Replace what a terminal cannot show, and give a user without a home one for the caches of libraries."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+    try:
+        Path.home()
+    except RuntimeError:
+        home = Path(tempfile.gettempdir()) / f"formation_gnc-home-{os.getuid()}"
+        home.mkdir(mode=0o700, exist_ok=True)
+        os.environ["HOME"] = str(home)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a subcommand.
 
     Returns:
         Exit status: 0 for success, 1 when a run failed, 2 when an input is not allowed, 130 when interrupted.
     """
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")  # what a terminal cannot show
+    _prepare_environment()
     parser = _Parser(
         prog="formation-gnc",
         description="Fly satellites in formation in software-in-the-loop; analyse, compare and replay the runs.",

@@ -14,6 +14,10 @@ _HEXADECIMAL = re.compile(r"[-+]?0[xX]([0-9a-fA-F]+\.?[0-9a-fA-F]*|\.[0-9a-fA-F]
 _SPECIAL = re.compile(r"([-+]?)\.?(nan|inf|infinity)", re.IGNORECASE)
 
 
+class RejectedYamlError(yaml.YAMLError):
+    """Valid YAML that ROS 2 refuses, with its line."""
+
+
 class ParameterLoader(yaml.SafeLoader):
     """Loader that gives every value as ROS 2 would, and raises yaml.YAMLError for what ROS 2 refuses."""
 
@@ -81,7 +85,7 @@ def _construct_mapping(loader: ParameterLoader, node: yaml.MappingNode) -> dict[
 
 
 def _reject(mark: Any, reason: str) -> NoReturn:
-    raise yaml.MarkedYAMLError(problem=f"line {mark.line + 1}: {reason}")
+    raise RejectedYamlError(f"line {mark.line + 1}: {reason}")
 
 
 ParameterLoader.add_constructor("tag:yaml.org,2002:str", _construct_scalar)

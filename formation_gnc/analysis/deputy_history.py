@@ -11,7 +11,7 @@ from formation_gnc.analysis.thinning import Thinned, ThinnedByKey, TickSelection
 from formation_gnc.analysis.trajectory import UnseenThrust
 from formation_gnc.flight import topics
 from formation_gnc.recording.decode import nanoseconds
-from formation_gnc.recording.reader import Fields
+from formation_gnc.recording.fields import Fields
 from formation_gnc.types import Matrix, Vector
 
 HOUR = 3600.0

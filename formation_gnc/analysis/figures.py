@@ -8,7 +8,8 @@ from scipy.stats import chi2
 from formation_gnc.analysis.trajectory import deputies_of, event_kinds, has_messages, trajectory
 from formation_gnc.analysis.verdict import ErrorHistory, Verdict
 from formation_gnc.flight import topics
-from formation_gnc.recording.reader import Bag, Fields
+from formation_gnc.recording.fields import Fields
+from formation_gnc.recording.reader import Bag
 from formation_gnc.records import EventKind, kind_name
 from formation_gnc.types import Vector
 

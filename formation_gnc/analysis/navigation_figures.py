@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from formation_gnc.analysis.trajectory import deputies_of
 from formation_gnc.errors import BagError
 from formation_gnc.flight import topics
-from formation_gnc.recording.reader import Bag, Fields
+from formation_gnc.recording.fields import Fields
+from formation_gnc.recording.reader import Bag
 from formation_gnc.types import Matrix, Vector
 
 Stamps = NDArray[np.int64]

@@ -11,7 +11,8 @@ from formation_gnc.analysis.thinning import ThinnedByKey, TickSelection
 from formation_gnc.analysis.timeline import Mark, Timeline, event_colours
 from formation_gnc.analysis.trajectory import deputies_of, event_kinds, unseen_thrust
 from formation_gnc.flight import topics
-from formation_gnc.recording.reader import Bag, Fields
+from formation_gnc.recording.fields import Fields
+from formation_gnc.recording.reader import Bag
 from formation_gnc.types import Matrix
 
 EVENTS = 300

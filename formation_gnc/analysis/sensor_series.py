@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation_gnc.analysis.thinning import ThinnedByKey
-from formation_gnc.recording.reader import Fields
+from formation_gnc.recording.fields import Fields
 from formation_gnc.types import Matrix
 
 HOUR = 3600.0

@@ -8,7 +8,8 @@ import numpy as np
 from formation_gnc.errors import BagError
 from formation_gnc.flight import topics
 from formation_gnc.orbit.constants import MU
-from formation_gnc.recording.reader import Bag, Fields
+from formation_gnc.recording.fields import Fields
+from formation_gnc.recording.reader import Bag
 from formation_gnc.records import kind_name
 from formation_gnc.types import Matrix, Times, Vector
 

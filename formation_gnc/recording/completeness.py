@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation_gnc.flight import topics
-from formation_gnc.flight.graph import GRAPH
 from formation_gnc.recording.provenance import parameters_record
 from formation_gnc.types import NANOSECONDS
 
@@ -15,6 +14,11 @@ PLACES = 3
 """Gaps of a topic that are named."""
 
 Stamps = NDArray[np.int64]
+
+ANSWERS = [
+    topic for topic in topics.DEPUTY_TOPICS if topic.every_tick and topic not in (topics.MEASUREMENT, topics.TIMING)
+]
+"""Topics by which a deputy's modules answer a tick."""
 
 
 def tick_of(metadata: Mapping[str, Mapping[str, str]], stamps: Stamps) -> int:
@@ -24,8 +28,7 @@ def tick_of(metadata: Mapping[str, Mapping[str, str]], stamps: Stamps) -> int:
         metadata: of the bag.
         stamps: (N,) ns, sorted, of a topic with a message at every tick.
     """
-    distinct = np.unique(stamps)
-    steps = distinct[1:] - distinct[:-1]
+    steps = np.diff(np.unique(stamps)).astype(np.int64)
     try:
         tick = round(float(json.loads(metadata[parameters_record("/plant")]["tick"])) * NANOSECONDS)
     except (KeyError, ValueError, TypeError, OverflowError):
@@ -48,8 +51,7 @@ def gaps(names: Mapping[str, int], stamps_of: Callable[[str], Stamps], tick: int
     """
     deputies = topics.deputies_in(list(names))
     by_plant = [topics.TRUTH.name, topics.CLOCK.name, *(topics.MEASUREMENT.of(deputy) for deputy in deputies)]
-    given = [topic for row in GRAPH for topic in row.gives if topic.every_tick]
-    answers = [topic.of(deputy) for deputy in deputies for topic in given]
+    answers = [topic.of(deputy) for deputy in deputies for topic in ANSWERS]
     present = {name: np.unique(stamps_of(name)) for name in (*by_plant, *answers) if names.get(name)}
     ends = [present[name][[0, -1]] for name in by_plant if name in present]
     if not ends or tick <= 0:

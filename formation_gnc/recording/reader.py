@@ -4,10 +4,10 @@ import heapq
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
-from itertools import count, groupby, takewhile
+from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from mcap.records import Channel, Schema
@@ -18,15 +18,13 @@ from formation_gnc.flight import topics as run_topics
 from formation_gnc.recording.completeness import gaps, tick_of
 from formation_gnc.recording.contents import BagContents, BagMessage, own_type, unread_reason
 from formation_gnc.recording.decode import MessageType, installed_type
+from formation_gnc.recording.fields import Arrays, Fields
 from formation_gnc.recording.order import RunOrder, pacing_topic
 from formation_gnc.recording.provenance import LOST
 from formation_gnc.recording.stored_file import OWN_PACKAGE, type_of
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Arrays = dict[str, NDArray[Any]]
-"""Messages of a topic: an array per field, a row per message."""
 
 
 @dataclass(frozen=True)
@@ -36,35 +34,6 @@ class Topic:
     name: str
     type_name: str
     count: int
-
-
-class Fields(Arrays):
-    """Messages of a topic as arrays by field; raises BagError for a field that they lack."""
-
-    def __init__(self, source: str, arrays: Arrays) -> None:
-        """Hold the arrays of a source, which errors name."""
-        super().__init__(arrays)
-        self._source = source
-
-    def __missing__(self, field: str) -> NoReturn:
-        """Raise BagError."""
-        raise BagError(f"{self._source}: no message has a field {field}")
-
-    def elements(self, field: str) -> Iterator[str]:
-        """Names of the elements of a list of messages, "readings.0" and so on, of the longest list."""
-        names = (f"{field}.{index}" for index in count())
-        return takewhile(lambda name: any(each.startswith(f"{name}.") for each in self), names)
-
-    def integers(self, field: str) -> NDArray[np.int64]:
-        """Values of a field of integers.
-
-        Raises:
-            BagError: it has another type, as in a bag of another version of the messages.
-        """
-        column = self[field]
-        if column.dtype.kind not in "iu":
-            raise BagError(f"{self._source}: field {field} is not of integers")
-        return column.astype(np.int64)
 
 
 class Bag:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from io import SEEK_END, BytesIO
 from typing import Any, BinaryIO
 
-import lz4.frame
+import lz4.frame  # type: ignore[import-untyped]
 import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream

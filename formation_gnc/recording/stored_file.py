@@ -23,6 +23,7 @@ _TIME = {b"\0\0": Struct(">iI"), b"\0\1": Struct("<iI")}
 """Seconds and nanoseconds of a stamp, by the encapsulation of plain CDR."""
 _BODY = 4  # bytes before the body of a message
 _LARGEST = 2**63 - 1
+_LATEST = 2**62  # beyond any header's stamp: of a run's message that is too short for one, received later still
 
 
 class Series(NamedTuple):
@@ -105,6 +106,7 @@ class _Stamps:
                 self._same.append(data)
             else:
                 self._same = [data]
+            stamp = min(stamp, _LATEST)
         if stamp > _LARGEST:
             self.is_unsigned = True
             stamp -= 2**64

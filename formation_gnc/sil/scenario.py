@@ -16,6 +16,7 @@ import formation_gnc
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight.graph import GRAPH
 from formation_gnc.guidance.fleet_checks import check_fleet
+from formation_gnc.parameter_yaml import RejectedYamlError
 from formation_gnc.parameters import dump, load, read_yaml
 from formation_gnc.plant.parameters import PlantParameters
 
@@ -175,9 +176,10 @@ def _sections(path: Path) -> list[tuple[str, Mapping[str, Any]]]:
         document = read_yaml(path.read_text())
     except OSError as error:
         raise ConfigurationError(f"{path}: cannot be read ({error.strerror})") from None
+    except RejectedYamlError as error:
+        raise ConfigurationError(f"{path}: {error}") from None
     except (yaml.YAMLError, ValueError) as error:  # undecodable text, or a date that there is not
-        reason = " ".join(str(error).split())
-        raise ConfigurationError(f"{path}: not YAML as ROS 2 reads it ({reason})") from None
+        raise ConfigurationError(f"{path}: not YAML ({' '.join(str(error).split())})") from None
     if not isinstance(document, dict):
         raise ConfigurationError(f"{path}: not a ROS 2 parameter file; it must map node names to {SECTION}")
     return list(_walk(path, document, ""))
