@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from formation_gnc.navigation.adaptive_noise import AdaptiveNoise
 from formation_gnc.navigation.chief_tracker import ChiefTracker
 from formation_gnc.navigation.consistency import Consistency
 from formation_gnc.navigation.filters import FILTERS, RelativeFilter
@@ -46,6 +47,7 @@ class FilterState:
     last_reading: int
     """Stamp at which a reading was last used, ns."""
     consistency: Consistency = field(default_factory=Consistency)
+    noise: AdaptiveNoise = field(default_factory=AdaptiveNoise)
 
 
 def acquire(

@@ -5,6 +5,7 @@ from enum import Enum
 import numpy as np
 
 from formation_gnc.flight.module import Configuration, FlightModule
+from formation_gnc.navigation.adaptive_noise import AdaptiveNoise
 from formation_gnc.navigation.consistency import Verdict
 from formation_gnc.navigation.filter_state import Design, FilterState, acquire, expected_observability
 from formation_gnc.navigation.filters import FILTERS
@@ -74,6 +75,8 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
             state.filter = FILTERS[parameters.filter](state.filter.state, state.filter.covariance)
         if parameters.latest_ticks != old.parameters.latest_ticks:
             state.history = StateHistory(parameters.latest_ticks, state.history)
+        if new.design.variance != old.design.variance:
+            state.noise = AdaptiveNoise()
         if new.design.variance != old.design.variance or (
             parameters.observability_window != old.parameters.observability_window
         ):
@@ -103,6 +106,8 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
             estimate = None
         for subject, detail in self._rejections.take_reports():
             self.log(measurement.time, EventKind.REJECTED, detail, subject)
+        for subject, detail in state.noise.take_reports():
+            self.log(measurement.time, EventKind.WARNING, detail, subject)
         return estimate
 
     def _action(self, measurement: Measurement) -> _Action:
@@ -163,8 +168,10 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         state.history.add(interval)
         state.time += step.nanoseconds
         words = state.observability.words
-        if state.observability.propagate(transition, step.seconds) and state.observability.words != words:
-            self._report_observability(state)
+        if state.observability.propagate(transition, step.seconds):
+            state.noise.begin_window()
+            if state.observability.words != words:
+                self._report_observability(state)
 
     def _acceleration(self, state: FilterState, measurement: Measurement) -> Vector:
         """Acceleration by thrust over the tick that has ended; zero where it is not plausible."""
@@ -192,14 +199,18 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         """Update with the readings, and check consistency; none when the state is lost."""
         result = self._update(state, measurement)
         if result is not None:
-            verdict, factor = state.consistency.judge(result.nis, result.used, result.rejected)
+            gate = self.configuration.design.gate
+            verdict, factor = state.consistency.judge(
+                result.nis, result.used, result.rejected, lambda: state.noise.explains_excess(gate)
+            )
+            state.filter.covariance = state.noise.correct(state.filter.covariance, state.observability.transition)
             if verdict is Verdict.GIVE_UP:
                 self._lose(measurement.time, "readings contradict the state, however uncertain")
                 return None
             if verdict is Verdict.INFLATE and _has_plausible_fix(measurement):
                 return self._estimate(self._acquire(measurement), measurement, EstimateStatus.ACQUIRED)
             if verdict is Verdict.INFLATE:
-                state.filter.covariance = state.filter.covariance * factor
+                state.filter.covariance = state.observability.inflate(state.filter.covariance, factor)
                 self.log(measurement.time, EventKind.DIVERGED, f"covariance inflated by {factor:.3g}")
                 status = EstimateStatus.DIVERGED
         if status is EstimateStatus.TRACKING:
@@ -230,7 +241,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         readings = state.checks.accept(
             measurement.readings,
             measurement.time,
-            design.variance,
+            state.noise.scaled(design.variance),
             parameters.latest,
             state.chief.state,
             state.history,
