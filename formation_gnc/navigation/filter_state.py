@@ -44,6 +44,8 @@ class FilterState:
     history: StateHistory
     checks: ReadingChecks
     observability: Observability
+    start: int
+    """Stamp of the acquisition fix, ns."""
     last_reading: int
     """Stamp at which a reading was last used, ns."""
     consistency: Consistency = field(default_factory=Consistency)
@@ -63,6 +65,7 @@ def acquire(
         history=StateHistory(parameters.latest_ticks),
         checks=ReadingChecks(rejections),
         observability=expected_observability(measurement.chief_state, measurement.fix, parameters, design),
+        start=measurement.time,
         last_reading=measurement.time,
     )
 

@@ -26,6 +26,9 @@ from formation_gnc.navigation.step import StepConstants, step_constants
 from formation_gnc.records import Estimate, EstimateStatus, EventKind, Measurement, Rejection
 from formation_gnc.types import NANOSECONDS, Vector
 
+SILENT_AFTER = 10.0
+"""Time without a valid reading after which a sensor in use is reported, in terms of `coasting_after`."""
+
 _NO_ACCELERATION = np.zeros(3)
 
 
@@ -106,9 +109,15 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
             estimate = None
         for subject, detail in self._rejections.take_reports():
             self.log(measurement.time, EventKind.REJECTED, detail, subject)
-        for subject, detail in state.noise.take_reports():
-            self.log(measurement.time, EventKind.WARNING, detail, subject)
+        self._warn_of_sensors(state, measurement.time)
         return estimate
+
+    def _warn_of_sensors(self, state: FilterState, time: int) -> None:
+        """Log sensors that are noisier than their parameters say, or silent."""
+        after = round(SILENT_AFTER * self.parameters.coasting_after * NANOSECONDS)
+        silences = state.checks.take_silences(self.configuration.design.variance, state.start, time, after)
+        for subject, detail in state.noise.take_reports() + silences:
+            self.log(time, EventKind.WARNING, detail, subject)
 
     def _action(self, measurement: Measurement) -> _Action:
         """Decide by deputy, fix and stamp."""
