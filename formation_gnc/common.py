@@ -13,6 +13,9 @@ from formation_gnc.types import NANOSECONDS
 LAST_SECOND = 2**31 - 1
 """Largest time (s) that the stamp of a message holds."""
 
+FIRST_EPOCH, LAST_EPOCH = -1577880000.0, 1577880000.0
+"""Years 1950 and 2050, Terrestrial Time since J2000.0, s: where the series of Sun and Moon (`orbit.sky`) hold."""
+
 
 @dataclass(frozen=True)
 class Orbit:
@@ -41,7 +44,10 @@ class CommonParameters:
     epoch: float = parameter(
         0.0,
         unit="s",
-        doc="Terrestrial Time at the start of the run since J2000.0; it places Sun, Moon and Greenwich",
+        minimum=FIRST_EPOCH,
+        maximum=LAST_EPOCH,
+        doc="Terrestrial Time at the start of the run since J2000.0; it places Sun, Moon and Greenwich, whose series "
+        "hold from 1950 to 2050",
     )
 
     def __post_init__(self) -> None:

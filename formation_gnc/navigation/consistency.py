@@ -1,6 +1,7 @@
 """Consistency of the filter with its readings."""
 
 from collections import deque
+from collections.abc import Callable
 from enum import Enum
 from functools import cache
 
@@ -39,13 +40,14 @@ class Consistency:
         self._freedom: deque[int] = deque(maxlen=WINDOW)
         self._rejected = 0
 
-    def judge(self, nis: float, used: int, rejected: int) -> tuple[Verdict, float]:
+    def judge(self, nis: float, used: int, rejected: int, explains_excess: Callable[[], bool]) -> tuple[Verdict, float]:
         """Judge an update.
 
         Args:
             nis: normalised innovation squared of the values used.
             used: number of these, the degrees of freedom of their NIS.
             rejected: number of values rejected by the gates.
+            explains_excess: whether noisier sensors explain a NIS that is too large.
 
         Returns:
             The verdict, and the factor by which to inflate the covariance.
@@ -64,6 +66,8 @@ class Consistency:
             return Verdict.CONSISTENT, 1.0
         self._nis.clear()
         self._freedom.clear()
+        if explains_excess():
+            return Verdict.CONSISTENT, 1.0
         return Verdict.INFLATE, total / freedom
 
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from formation_gnc.navigation.adaptive_noise import AdaptiveNoise
 from formation_gnc.navigation.chief_tracker import ChiefTracker
 from formation_gnc.navigation.consistency import Consistency
 from formation_gnc.navigation.filters import FILTERS, RelativeFilter
@@ -43,9 +44,12 @@ class FilterState:
     history: StateHistory
     checks: ReadingChecks
     observability: Observability
+    start: int
+    """Stamp of the acquisition fix, ns."""
     last_reading: int
     """Stamp at which a reading was last used, ns."""
     consistency: Consistency = field(default_factory=Consistency)
+    noise: AdaptiveNoise = field(default_factory=AdaptiveNoise)
 
 
 def acquire(
@@ -61,6 +65,7 @@ def acquire(
         history=StateHistory(parameters.latest_ticks),
         checks=ReadingChecks(rejections),
         observability=expected_observability(measurement.chief_state, measurement.fix, parameters, design),
+        start=measurement.time,
         last_reading=measurement.time,
     )
 

@@ -1,6 +1,7 @@
 """Checks of a measurement before the filter uses it; rejections are counted by reason."""
 
 from collections import Counter
+from collections.abc import Iterable
 from math import isfinite, sqrt
 
 import numpy as np
@@ -60,6 +61,9 @@ class ReadingChecks:
         """Without a memory of readings."""
         self._rejections = rejections
         self._times: dict[str, set[int]] = {}
+        self._read: dict[str, int] = {}
+        self._silent: set[str] = set()
+        self._next_silence = 0
 
     def accept(
         self,
@@ -94,6 +98,7 @@ class ReadingChecks:
             if reason is not None:
                 self._rejections.add(reason, reading.sensor)
                 continue
+            self._read[reading.sensor] = time
             names.append(reading.sensor)
             values += reading.values
             ages.append(reading.age / NANOSECONDS)
@@ -102,6 +107,32 @@ class ReadingChecks:
             return None
         model = measurement_model(tuple(names))
         return Readings(model, np.array(values), ages, np.array(variances), chief, history, any(ages))
+
+    def take_silences(self, sensors_in_use: Iterable[str], start: int, time: int, after: int) -> list[tuple[str, str]]:
+        """Subject and detail for each sensor in use that has given no valid reading for long, and when it reads again.
+
+        Args:
+            sensors_in_use: their names.
+            start: when readings could begin, ns.
+            time: now, ns.
+            after: ns without a valid reading that are reported.
+        """
+        if time < self._next_silence:
+            return []
+        reports, self._next_silence = [], time + after // 10
+        for name in sensors_in_use:
+            last = self._read.get(name)
+            is_silent = time - (start if last is None else last) >= after
+            if is_silent == (name in self._silent):
+                continue
+            self._silent ^= {name}
+            if not is_silent:
+                reports.append((name, "reads again"))
+            elif last is None:
+                reports.append((name, f"in use, but it has never read in {after / NANOSECONDS:g} s"))
+            else:
+                reports.append((name, f"in use, but no valid reading for {after / NANOSECONDS:g} s"))
+        return reports
 
     def _fault(self, reading: Reading, size: int, time: int, latest: float) -> Rejection | None:
         if len(reading.values) != size or not all(map(isfinite, reading.values)):

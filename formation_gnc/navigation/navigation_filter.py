@@ -5,6 +5,7 @@ from enum import Enum
 import numpy as np
 
 from formation_gnc.flight.module import Configuration, FlightModule
+from formation_gnc.navigation.adaptive_noise import AdaptiveNoise
 from formation_gnc.navigation.consistency import Verdict
 from formation_gnc.navigation.filter_state import Design, FilterState, acquire, expected_observability
 from formation_gnc.navigation.filters import FILTERS
@@ -24,6 +25,9 @@ from formation_gnc.navigation.state_history import StateHistory
 from formation_gnc.navigation.step import StepConstants, step_constants
 from formation_gnc.records import Estimate, EstimateStatus, EventKind, Measurement, Rejection
 from formation_gnc.types import NANOSECONDS, Vector
+
+SILENT_AFTER = 10.0
+"""Time without a valid reading after which a sensor in use is reported, in terms of `coasting_after`."""
 
 _NO_ACCELERATION = np.zeros(3)
 
@@ -74,6 +78,8 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
             state.filter = FILTERS[parameters.filter](state.filter.state, state.filter.covariance)
         if parameters.latest_ticks != old.parameters.latest_ticks:
             state.history = StateHistory(parameters.latest_ticks, state.history)
+        if new.design.variance != old.design.variance:
+            state.noise = AdaptiveNoise()
         if new.design.variance != old.design.variance or (
             parameters.observability_window != old.parameters.observability_window
         ):
@@ -103,7 +109,15 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
             estimate = None
         for subject, detail in self._rejections.take_reports():
             self.log(measurement.time, EventKind.REJECTED, detail, subject)
+        self._warn_of_sensors(state, measurement.time)
         return estimate
+
+    def _warn_of_sensors(self, state: FilterState, time: int) -> None:
+        """Log sensors that are noisier than their parameters say, or silent."""
+        after = round(SILENT_AFTER * self.parameters.coasting_after * NANOSECONDS)
+        silences = state.checks.take_silences(self.configuration.design.variance, state.start, time, after)
+        for subject, detail in state.noise.take_reports() + silences:
+            self.log(time, EventKind.WARNING, detail, subject)
 
     def _action(self, measurement: Measurement) -> _Action:
         """Decide by deputy, fix and stamp."""
@@ -163,8 +177,10 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         state.history.add(interval)
         state.time += step.nanoseconds
         words = state.observability.words
-        if state.observability.propagate(transition, step.seconds) and state.observability.words != words:
-            self._report_observability(state)
+        if state.observability.propagate(transition, step.seconds):
+            state.noise.begin_window()
+            if state.observability.words != words:
+                self._report_observability(state)
 
     def _acceleration(self, state: FilterState, measurement: Measurement) -> Vector:
         """Acceleration by thrust over the tick that has ended; zero where it is not plausible."""
@@ -192,14 +208,18 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         """Update with the readings, and check consistency; none when the state is lost."""
         result = self._update(state, measurement)
         if result is not None:
-            verdict, factor = state.consistency.judge(result.nis, result.used, result.rejected)
+            gate = self.configuration.design.gate
+            verdict, factor = state.consistency.judge(
+                result.nis, result.used, result.rejected, lambda: state.noise.explains_excess(gate)
+            )
+            state.filter.covariance = state.noise.correct(state.filter.covariance, state.observability.transition)
             if verdict is Verdict.GIVE_UP:
                 self._lose(measurement.time, "readings contradict the state, however uncertain")
                 return None
             if verdict is Verdict.INFLATE and _has_plausible_fix(measurement):
                 return self._estimate(self._acquire(measurement), measurement, EstimateStatus.ACQUIRED)
             if verdict is Verdict.INFLATE:
-                state.filter.covariance = state.filter.covariance * factor
+                state.filter.covariance = state.observability.inflate(state.filter.covariance, factor)
                 self.log(measurement.time, EventKind.DIVERGED, f"covariance inflated by {factor:.3g}")
                 status = EstimateStatus.DIVERGED
         if status is EstimateStatus.TRACKING:
@@ -230,7 +250,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         readings = state.checks.accept(
             measurement.readings,
             measurement.time,
-            design.variance,
+            state.noise.scaled(design.variance),
             parameters.latest,
             state.chief.state,
             state.history,

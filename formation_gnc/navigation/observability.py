@@ -117,9 +117,13 @@ class Observability:
         self._begin_window()
 
     def _begin_window(self) -> None:
-        self._elapsed, self._transition, self._gramian = 0.0, np.eye(6), np.zeros((6, 6))
+        self._elapsed, self._gramian = 0.0, np.zeros((6, 6))
+        self.transition = np.eye(6)
+        """(6, 6) since the start of the window."""
 
     def _set(self, directions: Matrix) -> None:
+        self._directions = directions
+        """(b, 6) unobservable ones at the start of the window."""
         self.words = in_words(directions)
         self.direction = directions[0] if len(directions) else NO_DIRECTION
         """(6,) least observable direction; zero when the state is observable."""
@@ -127,16 +131,38 @@ class Observability:
     def propagate(self, transition: Matrix, duration: float) -> bool:
         """Propagate by a transition matrix (6, 6) over a duration, s; returns whether a window has ended."""
         self.direction = self._propagated(self.direction, transition)
-        linear_algebra.accumulate_transition(self._transition, transition)
+        linear_algebra.accumulate_transition(self.transition, transition)
         self._elapsed += duration
         if self._elapsed < self._window:
             return False
         if self._gramian.any():
-            unobservable = unobservable_directions(self._gramian, self._mean_motion)
-            moved = [self._propagated(each, self._transition) for each in unobservable]
-            self._set(np.array(moved).reshape(-1, 6))
+            self._directions = unobservable_directions(self._gramian, self._mean_motion)
+            self._set(self._moved())
+        else:
+            self._directions = self._moved()
         self._begin_window()
         return True
+
+    def _moved(self) -> Matrix:
+        """(b, 6) unobservable directions now."""
+        return np.array([self._propagated(each, self.transition) for each in self._directions]).reshape(-1, 6)
+
+    def inflate(self, covariance: Matrix, factor: float) -> Matrix:
+        """Multiply a covariance (6, 6) by a factor where readings observe the state.
+
+        The functionals of the state that an unobservable direction does not change get the factor on their
+        covariance; the variance along the direction, given these, stays, since no reading would take it back:
+        P' = f P - (f - 1) U (U' P^-1 U)^-1 U' with the directions as columns of U.
+        """
+        if not len(self._directions):
+            return covariance * factor
+        scale = np.repeat([1.0, self._mean_motion], 3)
+        directions = self._moved().T
+        scaled = covariance / np.outer(scale, scale)
+        kept = directions @ np.linalg.solve(directions.T @ np.linalg.solve(scaled, directions), directions.T)
+        inflated: Matrix = (kept + factor * (scaled - kept)) * np.outer(scale, scale)
+        linear_algebra.restore_definiteness(inflated)
+        return inflated
 
     def _propagated(self, direction: Vector, transition: Matrix) -> Vector:
         """A copy: estimates hold the old one."""
@@ -146,4 +172,4 @@ class Observability:
 
     def add(self, jacobian: Matrix, variance: Vector) -> None:
         """Add readings with Jacobian (m, 6) with respect to the present state, and variances (m,)."""
-        linear_algebra.accumulate_information(self._gramian, jacobian, self._transition, variance)
+        linear_algebra.accumulate_information(self._gramian, jacobian, self.transition, variance)

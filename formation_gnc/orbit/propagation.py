@@ -1,10 +1,11 @@
 """Numerical propagation of inertial states, tick by tick, with thrust held over the tick.
 
-Fixed steps of order eight: the same input gives the same bits, and ticks end exactly on a step.
+Fixed steps of order eight: the same input gives the same bits, and ticks end exactly on a step. A step that does not
+resolve the motion, such as a dive through dense air, is divided.
 """
 
 from collections.abc import Callable, Sequence
-from math import inf, isfinite
+from math import asin, atan2, degrees, inf, isfinite, pi, sqrt
 
 import numpy as np
 from numba import float64, int64
@@ -12,91 +13,20 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
 from formation_gnc.errors import ConfigurationError, ImpactError
-from formation_gnc.orbit.constants import EARTH_RADIUS
 from formation_gnc.orbit.forces.force import Body
 from formation_gnc.orbit.forces.model import CACHE_KEY, COEFFICIENTS, SETTINGS, Forces, acceleration
 from formation_gnc.orbit.forces.radiation import illumination
 from formation_gnc.orbit.frames import inertial_acceleration
 from formation_gnc.orbit.gravity import oblate_acceleration, oblate_gradient
-from formation_gnc.orbit.jit import ANY_MATRIX, ANY_VECTOR, inline, kernel
-from formation_gnc.orbit.runge_kutta import COUPLING, INSTANT_OF_STAGE, INSTANTS, STAGES, WEIGHTS
-from formation_gnc.orbit.sky import EPHEMERIDES, look_up, sun
+from formation_gnc.orbit.integration import TICK, over_mass, propagate_tick
+from formation_gnc.orbit.jit import ANY_MATRIX, ANY_VECTOR, kernel
+from formation_gnc.orbit.runge_kutta import COUPLING, STAGES, WEIGHTS
+from formation_gnc.orbit.sky import EPHEMERIDES, earth_rotation_angle, look_up, sun
 
 Array = NDArray[np.float64]
 
 
-_TICK = (float64[:, ::1], ANY_MATRIX, ANY_VECTOR, float64[:, ::1], float64[::1], int64, float64, float64, int64)
-"""Signature of the kernels of a tick. They work in place: boxing a result array costs more than the rest of the
-call."""
-
-
-@inline
-def _over_mass(coefficients: Array, masses: Array, satellite: int, out: Array) -> None:
-    """Fill in the coefficients of a satellite over its present mass; without bodies they stay zero."""
-    if len(coefficients) > 0:
-        for force in range(COEFFICIENTS):
-            out[force] = coefficients[satellite, force] / masses[satellite]
-
-
-@inline
-def _first_below_surface(states: Array) -> int:
-    """Index of the first satellite that is not above the Earth's surface, or -1."""
-    for satellite in range(len(states)):
-        x, y, z = states[satellite, 0], states[satellite, 1], states[satellite, 2]
-        if not x * x + y * y + z * z >= EARTH_RADIUS * EARTH_RADIUS:  # NaN included
-            return satellite
-    return -1
-
-
-@kernel(_TICK, CACHE_KEY)
-def _propagate(
-    states: Array,
-    thrust: Array,
-    masses: Array,
-    coefficients: Array,
-    settings: Array,
-    needed: int,
-    time: float,
-    tick: float,
-    substeps: int,
-) -> int:
-    """Propagate states by a tick; returns `_first_below_surface`."""
-    step = tick / substeps
-    coupling, weights = COUPLING.copy(), WEIGHTS.copy()  # constants would be unrolled: seconds to compile
-    satellites = states.shape[0]
-    ephemerides = np.zeros((len(INSTANTS), EPHEMERIDES))
-    per_mass = np.zeros(COEFFICIENTS)
-    # Tuples stay in registers; with arrays a tick takes a third longer.
-    settings_ = to_fixed_tuple(settings, SETTINGS)
-    rates = np.empty((STAGES, 6))
-    stage = np.empty(6)
-    for substep in range(substeps):
-        for instant in range(len(INSTANTS)):
-            look_up(needed, time + (substep + INSTANTS[instant]) * step, ephemerides[instant])
-        for satellite in range(satellites):
-            _over_mass(coefficients, masses, satellite, per_mass)
-            coefficients_ = to_fixed_tuple(per_mass, COEFFICIENTS)
-            for i in range(STAGES):
-                for c in range(6):
-                    change = 0.0
-                    for j in range(i):
-                        change += coupling[i, j] * rates[j, c]
-                    stage[c] = states[satellite, c] + step * change
-                sky = to_fixed_tuple(ephemerides[INSTANT_OF_STAGE[i]], EPHEMERIDES)
-                ax, ay, az = acceleration(settings_, coefficients_, sky, to_fixed_tuple(stage, 6))
-                rates[i, 0], rates[i, 1], rates[i, 2] = stage[3], stage[4], stage[5]
-                rates[i, 3] = ax + thrust[satellite, 0]
-                rates[i, 4] = ay + thrust[satellite, 1]
-                rates[i, 5] = az + thrust[satellite, 2]
-            for c in range(6):
-                change = 0.0
-                for i in range(STAGES):
-                    change += weights[i] * rates[i, c]
-                states[satellite, c] += step * change
-    return _first_below_surface(states)
-
-
-@kernel(_TICK, CACHE_KEY)
+@kernel(TICK, CACHE_KEY)
 def _propagate_with_thrust(
     states: Array,
     forces: Array,
@@ -107,10 +37,11 @@ def _propagate_with_thrust(
     time: float,
     tick: float,
     substeps: int,
+    moment: Array,
 ) -> int:
-    """`_propagate` under forces along the Hill axes of the first satellite."""
+    """`propagate_tick` under forces along the Hill axes of the first satellite."""
     thrust = inertial_acceleration(states[0], forces, masses)
-    return _propagate(states, thrust, masses, coefficients, settings, needed, time, tick, substeps)
+    return propagate_tick(states, thrust, masses, coefficients, settings, needed, time, tick, substeps, moment)
 
 
 @kernel(float64[:, ::1](ANY_MATRIX, ANY_VECTOR, float64[:, ::1], float64[::1], int64, float64), CACHE_KEY)
@@ -123,7 +54,7 @@ def _accelerations(
     look_up(needed, time, ephemerides)
     per_mass, state = np.zeros(COEFFICIENTS), np.empty(6)
     for satellite in range(len(states)):
-        _over_mass(coefficients, masses, satellite, per_mass)
+        over_mass(coefficients, masses, satellite, per_mass)
         state[:] = states[satellite]
         out[satellite, 0], out[satellite, 1], out[satellite, 2] = acceleration(
             to_fixed_tuple(settings, SETTINGS),
@@ -173,6 +104,7 @@ class Propagator:
         self._settings, self._needed = forces.settings(), forces.ephemerides()
         self._coefficients = forces.coefficients(bodies)
         self._tick, self._substeps, self._epoch = tick, substeps, epoch
+        self._moment = np.zeros(1)
         self._masses = np.array([body.mass for body in bodies])
 
     def propagate(self, time: float, states: Array, accelerations: Array, masses: Array | None = None) -> Array:
@@ -190,7 +122,7 @@ class Propagator:
         Raises:
             ImpactError: a satellite has come down.
         """
-        return self._after(_propagate, time, states, accelerations, self._masses if masses is None else masses)
+        return self._after(propagate_tick, time, states, accelerations, self._masses if masses is None else masses)
 
     def propagate_with_thrust(self, time: float, states: Array, forces: Array, masses: Array) -> Array:
         """`propagate` with forces (N, 3), N, along the Hill axes of the first satellite at the start of the tick."""
@@ -227,7 +159,7 @@ class Propagator:
         masses: Array,
     ) -> Array:
         self._check_count(states)
-        result = states.copy()
+        result, moment = states.copy(), self._moment
         fallen = kernel_of_tick(
             result,
             thrust,
@@ -238,13 +170,24 @@ class Propagator:
             self._epoch + time,
             self._tick,
             self._substeps,
+            moment,
         )
         if fallen >= 0:
-            where = [float(value) for value in result[fallen]]
-            raise ImpactError(
-                f"satellite {fallen} is below the Earth's surface at {time + self._tick:g} s: state {where}"
-            )
+            raise ImpactError(self._impact(fallen, time + float(moment[0]), result[fallen]))
         return result
+
+    def _impact(self, satellite: int, time: float, state: Array) -> str:
+        """Time and place at which a satellite has come down."""
+        where = [float(value) for value in state]
+        x, y, z = where[:3]
+        radius = sqrt(x * x + y * y + z * z)
+        if not radius > 0.0 or not isfinite(radius):
+            return f"satellite {satellite} is below the Earth's surface at {time:g} s: state {where}"
+        east = (atan2(y, x) - earth_rotation_angle(self._epoch + time) + pi) % (2.0 * pi) - pi
+        return (
+            f"satellite {satellite} is below the Earth's surface at {time:.10g} s, latitude "
+            f"{degrees(asin(z / radius)):.1f} deg, longitude {degrees(east):.1f} deg: state {where}"
+        )
 
     def illumination(self, time: float, position: Array) -> float:
         """Visible fraction of the Sun's disc: 0 in umbra, 1 in full sunlight.

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-from formation_gnc.common import LAST_SECOND, CommonParameters
+from formation_gnc.common import LAST_EPOCH, LAST_SECOND, CommonParameters
 from formation_gnc.errors import ParameterError
 from formation_gnc.orbit.forces.force import Body
 from formation_gnc.orbit.forces.model import Forces
@@ -56,7 +56,8 @@ class PlantParameters(CommonParameters):
         """Check the names of the deputies and the duration.
 
         Raises:
-            ParameterError: a name that is no namespace or comes twice, or a duration below a tick.
+            ParameterError: a name that is no namespace or comes twice, a duration below a tick, or one that ends
+                beyond the years of the ephemerides.
         """
         super().__post_init__()
         if len(set(self.deputies)) != len(self.deputies) or not self.deputies:
@@ -70,6 +71,11 @@ class PlantParameters(CommonParameters):
                 )
         if round(self.duration * NANOSECONDS) < self.tick_ns:
             raise ParameterError(f"parameter duration: {self.duration!r} s is not allowed; it must be a tick or more")
+        if self.epoch + self.duration > LAST_EPOCH:
+            raise ParameterError(
+                f"parameter duration: {self.duration!r} s is not allowed; with epoch {self.epoch!r} s it must end by "
+                f"{LAST_EPOCH!r} s since J2000.0, where the ephemerides of Sun and Moon end"
+            )
 
     @cached_property
     def ticks(self) -> int:

@@ -648,3 +648,26 @@ def test_readings_of_unused_sensors_change_nothing() -> None:
     one, other = run(navigation_filter(setup), samples)[-1], run(navigation_filter(setup), bare)[-1]
     assert one.covariance.tobytes() == other.covariance.tobytes()
     assert not one.rejections
+
+
+def test_a_sensor_in_use_that_never_reads_is_reported() -> None:
+    setup = parameters(sensors=(*THREE, "chief_range"))
+    samples = list(simulate(replace(setup, sensors=THREE), 200, np.random.default_rng(29)))
+    filter = navigation_filter(setup)
+    run(filter, samples)
+    events = [event for event in filter.take_events() if event.kind == EventKind.WARNING]
+    assert [(event.subject, event.tick) for event in events] == [("chief_range", 60)]  # ten times coasting_after
+    assert "never" in events[0].detail
+
+
+def test_a_sensor_that_falls_silent_is_reported_and_so_is_its_return() -> None:
+    setup = parameters()
+    stream = [
+        changed(sample, readings=sample.measurement.readings[1:]) if 50 <= index < 150 else sample
+        for index, sample in enumerate(simulate(setup, 250, np.random.default_rng(30)))
+    ]
+    filter = navigation_filter(setup)
+    run(filter, stream)
+    events = [event for event in filter.take_events() if event.kind == EventKind.WARNING]
+    assert [event.subject for event in events] == ["radius", "radius"]
+    assert 50 < events[0].tick < 150 <= events[1].tick

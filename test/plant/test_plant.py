@@ -274,6 +274,12 @@ def rejection(values: dict[str, Any]) -> str:
             1e300,
             "parameter duration: 1e+300 is not allowed; it must be above 0, at most 2.14748e+09",
         ),
+        ("epoch", 1e300, "parameter epoch: 1e+300 is not allowed; it must be"),
+        (
+            "epoch",
+            1577879990.0,
+            "parameter duration: 6000.0 s is not allowed; with epoch 1577879990.0 s it must end by 1577880000.0 s",
+        ),
         ("tick", 1e300, "parameter tick: 1e+300 is not allowed; it must be above 0, at most 2.14748e+09"),
         ("chief.semi_major_axis", 1e300, "parameter chief.semi_major_axis: 1e+300 is not allowed"),
         ("chief.semi_major_axis", 6e6, "perigee radius is 5940000.0 m: it must be at least the Earth's"),

@@ -1,0 +1,31 @@
+"""Process noise that the truth's forces ask of a filter."""
+
+import pytest
+
+from formation_gnc.sil.process_noise import process_noise_warnings, unmodelled_density
+from formation_gnc.sil.scenario import load_scenario
+
+
+def test_a_truth_with_j2_alone_asks_for_no_process_noise() -> None:
+    # the same forces in both, which round differently
+    assert unmodelled_density(load_scenario("leader_follower").plant, "deputy1") < 1e-20
+
+
+def test_differential_sunlight_asks_for_the_square_of_its_acceleration() -> None:
+    """2e-3 m^2/kg times 4.6e-6 N/m^2, shared by the axes of the plane; a radian of the orbit takes 13,700 s."""
+    density = unmodelled_density(load_scenario("geostationary").plant, "deputy1")
+    acceleration = (2.0 * 1.4 / 100.0 - 20.0 * 1.3 / 1000.0) * 4.56e-6
+    assert density == pytest.approx(acceleration**2 / 2.0 * 13713.0, rel=0.3)
+
+
+@pytest.mark.parametrize(
+    "scenario", ["leader_follower", "geostationary", "eccentric_leo", "tetrahedral", "projected_circle"]
+)
+def test_shipped_scenarios_have_the_process_noise_that_they_need(scenario: str) -> None:
+    assert process_noise_warnings(load_scenario(scenario)) == []
+
+
+def test_too_little_process_noise_is_named_with_what_is_needed() -> None:
+    scenario = load_scenario("geostationary", {"/**/navigation": {"acceleration_density": 1e-14}})
+    (warning,) = process_noise_warnings(scenario)
+    assert warning.startswith("/deputy1/navigation: acceleration_density is 1.0e-14 m^2/s^3")
