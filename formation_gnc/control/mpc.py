@@ -21,7 +21,7 @@ from formation_gnc.control.mpc_constraints import (
     ThrustRate,
     TotalThrust,
 )
-from formation_gnc.control.osqp_session import OsqpSession, SolverError
+from formation_gnc.control.plan_solver import PlanSolver, SolverError
 from formation_gnc.control.riccati import Weights, periodic_cost_to_go
 from formation_gnc.control.weights import QuadraticWeights
 from formation_gnc.errors import DesignError
@@ -140,7 +140,7 @@ class ModelPredictiveController(Controller[MpcParameters]):
         self._rate: ThrustRate | None = None
         box, others = self._make_constraints()
         self._constraints = (box, *others)
-        self.session = OsqpSession(self.qps[0], box, others)
+        self.solver = PlanSolver(self.qps[0], box, others)
 
     def _check_horizons(self, common: CommonParameters) -> None:
         parameters = self._parameters
@@ -227,7 +227,7 @@ class ModelPredictiveController(Controller[MpcParameters]):
             "horizon [s]": parameters.step * parameters.horizon,
             "steps": parameters.horizon,
             "steps with thrust": self._steps,
-            **self.session.figures(),
+            **self.solver.figures(),
             **self.fallback_law.figures(),
         }
 
@@ -277,11 +277,11 @@ class ModelPredictiveController(Controller[MpcParameters]):
             raise SolverError("error out of range")
         qp = self._qp_at(estimate.time)
         gradient, cost_of_free_motion = qp.tracking(estimate, target, self._step_ns)
-        solution = self.session.solve(PlanInputs(qp, estimate, target, self.plan), gradient)
+        inputs = PlanInputs(qp, estimate, target, self.plan)
+        solution = self.solver.solve(inputs, gradient, 0.5 * qp.scale * cost_of_free_motion)
         self.plan = self._unit * solution.forces
         self._planned_at = estimate.time
-        cost = 2.0 * solution.objective / qp.scale + cost_of_free_motion
-        return Command(self.plan[0], solution.status, solution.iterations, float(cost))
+        return Command(self.plan[0], solution.status, solution.iterations, 2.0 * solution.cost / qp.scale)
 
     def _qp_at(self, time: int) -> CondensedQp:
         if len(self.qps) == 1:
