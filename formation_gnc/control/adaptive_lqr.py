@@ -15,6 +15,7 @@ from formation_gnc.control.weights import QuadraticWeights
 from formation_gnc.errors import DesignError
 from formation_gnc.parameters import parameter
 from formation_gnc.records import NavigationState, Target
+from formation_gnc.relative.chief import latitude_of
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.types import NANOSECONDS, Vector
 
@@ -146,7 +147,9 @@ class AdaptiveLinearQuadraticRegulator(Controller[AdaptiveLqrParameters]):
     def _adapt(self, estimate: NavigationState, target: Target, error: Vector) -> Vector:
         """Scaled thrust (3,), after an update of the networks."""
         networks, tick = self.networks, self._tick * self._rate_unit
-        latitude = self._latitude + self._mean_motion * estimate.time / NANOSECONDS
+        latitude = latitude_of(estimate.chief_state)
+        if latitude is None:
+            latitude = self._latitude + self._mean_motion * estimate.time / NANOSECONDS
         basis, gradients = basis_functions(estimate.relative_state / self._state_unit, self._radius, latitude)
         if self._target is None or has_jumped(self._target, target):
             networks.reset_observer(error)

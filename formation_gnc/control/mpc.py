@@ -275,7 +275,7 @@ class ModelPredictiveController(Controller[MpcParameters]):
         """Plan from an estimate; raises SolverError."""
         if not np.abs(estimate.relative_state - target.relative_state).max() < MAX_ERROR:
             raise SolverError("error out of range")
-        qp = self._qp_at(estimate.time)
+        qp = self._qp_at(estimate)
         gradient, cost_of_free_motion = qp.tracking(estimate, target, self._step_ns)
         inputs = PlanInputs(qp, estimate, target, self.plan)
         solution = self.solver.solve(inputs, gradient, 0.5 * qp.scale * cost_of_free_motion)
@@ -283,10 +283,12 @@ class ModelPredictiveController(Controller[MpcParameters]):
         self._planned_at = estimate.time
         return Command(self.plan[0], solution.status, solution.iterations, 2.0 * solution.cost / qp.scale)
 
-    def _qp_at(self, time: int) -> CondensedQp:
+    def _qp_at(self, estimate: NavigationState) -> CondensedQp:
+        """The QP nearest to the phase of the estimated chief."""
         if len(self.qps) == 1:
             return self.qps[0]
-        position = time / NANOSECONDS / self._model.period * len(self.qps)
+        time = self._model.time_at(estimate.chief_state, estimate.time / NANOSECONDS)
+        position = time / self._model.period * len(self.qps)
         return self.qps[round(position) % len(self.qps)]
 
 

@@ -3,6 +3,7 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from copy import copy
 from functools import partial
 from typing import Any
 
@@ -39,6 +40,10 @@ class TargetPath(ABC):
         """Propagate `formation`, prepared for the mean motion of `common`, from `phase` (rad) at time zero."""
         self._formation, self._phase, self._common = formation, phase, common
         self._ahead = phase / common.mean_motion
+
+    def anchored(self, chief: Vector, time: float) -> "TargetPath":
+        """The path about the orbit that the chief's inertial state (6,) at a time (s) is on; the same without one."""
+        return self
 
     @abstractmethod
     def states(self, times: Vector) -> Matrix:
@@ -112,7 +117,8 @@ class ModelPath(TargetPath):
     rates there, and the along-track rate that does not drift in the model, plus the formation's own drift.
     About an eccentric chief (Yamanaka and Ankersen) the radial motion then keeps the formation's shape in the
     true anomaly f, x = c1 sin f + c2 cos f; along and across the track the path is stretched with the chief's
-    distance. At the mean rates under J2 the phase follows the truth.
+    distance. At the mean rates under J2 the phase follows the truth; about an eccentric chief the path is anchored
+    to the estimated one, whose period and perigee J2 changes: its constants stay, by the true anomaly.
     """
 
     def __init__(
@@ -130,6 +136,15 @@ class ModelPath(TargetPath):
     def states(self, times: Vector) -> Matrix:
         """(N, 6) states by the model's transition matrices."""
         return self._transitions(0.0, times) @ self._start
+
+    def anchored(self, chief: Vector, time: float) -> TargetPath:
+        """With the same constants of motion about the orbit that the chief is seen on."""
+        model = self.model.anchored(chief, time)
+        if model is self.model:
+            return self
+        path = copy(self)
+        path.model, path._start = model, model.continued(self._start, self.model)
+        return path
 
     def _transitions(self, time: float, ahead: Vector) -> Matrix:
         return self.model.transitions(time, ahead)
