@@ -127,11 +127,17 @@ class ModelPath(TargetPath):
         """Start at time zero; raises OrbitError where the model does not exist about the chief."""
         super().__init__(formation, phase, common)
         self.model = model.about(common.chief_elements)
-        n, (in_plane, across) = common.mean_motion, self.model.phase_rates(0.0)
-        given = formation.states(np.array([self._ahead]))[0]
-        start = given * np.array([1.0, 1.0, 1.0, in_plane / n, 1.0, across / n])
-        self._start: Vector = self.model.bounded(0.0, start)
-        self._start[4] += given[4] + 2.0 * n * given[0]
+        self._start = self._start_in(self.model)
+        self._reference: tuple[LinearModel, Vector] | None = None
+        """The model anchored to the chief at time zero, and the start in it."""
+
+    def _start_in(self, model: LinearModel) -> Vector:
+        """(6,) state at time zero in a model."""
+        n, (in_plane, across) = self._common.mean_motion, model.phase_rates(0.0)
+        given = self._formation.states(np.array([self._ahead]))[0]
+        start: Vector = model.bounded(0.0, given * np.array([1.0, 1.0, 1.0, in_plane / n, 1.0, across / n]))
+        start[4] += given[4] + 2.0 * n * given[0]
+        return start
 
     def states(self, times: Vector) -> Matrix:
         """(N, 6) states by the model's transition matrices."""
@@ -141,9 +147,12 @@ class ModelPath(TargetPath):
         """With the same constants of motion about the orbit that the chief is seen on."""
         model = self.model.anchored(chief, time)
         if model is self.model:
-            return self
+            return self  # a model without a perigee
+        if self._reference is None:
+            first = self.model.anchored(state_from_elements(self._common.chief_elements), 0.0)
+            self._reference = first, self._start_in(first)
         path = copy(self)
-        path.model, path._start = model, model.continued(self._start, self.model)
+        path.model, path._start = model, model.continued(self._reference[1], self._reference[0])
         return path
 
     def _transitions(self, time: float, ahead: Vector) -> Matrix:

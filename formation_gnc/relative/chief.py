@@ -22,11 +22,15 @@ from formation_gnc.orbit.elements import (
 )
 from formation_gnc.orbit.frames import hill_rotation
 from formation_gnc.orbit.gravity import acceleration as gravity
+from formation_gnc.orbit.mean import mean_state
 from formation_gnc.orbit.propagation import propagate_with_transition
 from formation_gnc.relative.model import NO_THRUST, Array
 
 STEPS_PER_TURN = 200
 """Integration steps per revolution of a circular orbit at the perigee: rounding error at order eight."""
+
+DISTINCT_PERIGEE = 0.02
+"""Least mean eccentricity at which the perigee is defined, against what J2 does to it."""
 
 LATEST = 2048
 """Size of the caches of chief states."""
@@ -170,10 +174,15 @@ class KeplerChief(Chief):
         return (here - start) % math.tau / self.mean_motion
 
     def seen(self, inertial: Array, time: float) -> "KeplerChief | None":
-        """The ellipse that an inertial state (6,) is on at a time (s); None if it is on none."""
+        """The mean ellipse that an inertial state (6,) is on at a time (s); None if that has no distinct perigee.
+
+        The osculating one turns to and fro with every revolution under J2, by an angle of J2 over the eccentricity.
+        """
         try:
-            ellipse = KeplerChief.of(elements_from_state(inertial))
+            ellipse = KeplerChief.of(elements_from_state(mean_state(inertial)))
         except OrbitError:
+            return None
+        if ellipse.eccentricity < DISTINCT_PERIGEE:
             return None
         return replace(ellipse, true_anomaly=ellipse.anomaly(-time))
 

@@ -47,7 +47,7 @@ class TschaunerHempelModel(LinearModel):
         return time if own is None else own
 
     def anchored(self, chief: Array, time: float) -> Self:
-        """About the osculating ellipse of an inertial state (6,) at a time (s)."""
+        """About the mean ellipse of an inertial state (6,) at a time (s); the same if that is near-circular."""
         ellipse = self.chief.seen(chief, time)
         return self if ellipse is None else replace(self, chief=ellipse)
 
