@@ -89,9 +89,7 @@ class AdaptiveLinearQuadraticRegulator(Controller[AdaptiveLqrParameters]):
         self._mean_motion, self._latitude = model.mean_motion, orbit.argument_of_perigee + orbit.true_anomaly
         self._radius = orbit.semi_major_axis / parameters.reach
         try:
-            weights = Weights.scaled(
-                parameters.state_matrix(), vehicle.mass**2 * parameters.thrust_matrix(), common.tick
-            )
+            weights = Weights.scaled(parameters.state_matrix(), parameters.effort(vehicle), common.tick)
             cost_to_go, _ = continuous_cost_to_go(model.dynamics(0.0), model.INPUT, weights)
         except DesignError as error:
             raise DesignError(f"adaptive_lqr: {error}") from error

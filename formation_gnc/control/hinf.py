@@ -129,7 +129,14 @@ class HInfinityController(Controller[HinfParameters]):
     Parameters = HinfParameters
 
     def __init__(self, parameters: HinfParameters, common: CommonParameters, vehicle: Vehicle) -> None:
-        """Synthesise; raises DesignError if no gamma is feasible or the sampled loop is unstable."""
+        """Synthesise.
+
+        Raises:
+            DesignError: no feasible gamma, an unstable sampled loop, or no radial or along-track thruster.
+        """
+        if not (vehicle.thrust_limit[:2] > 0.0).all():
+            limits = vehicle.thrust_limit[:2].tolist()
+            raise DesignError(f"hinf: thrust_limit in the orbit plane (x, y) is {limits}; both must be above 0")
         model = DESIGN_MODELS[parameters.model](common)
         own = {name: np.array(value) for name, value in vars(parameters).items() if isinstance(value, tuple)}
         self.problem = MixedSensitivityProblem(
@@ -226,7 +233,7 @@ class HInfinityController(Controller[HinfParameters]):
         if self._states is None:
             self._states = self._states_for(off, self._force / estimate.mass - recovery)
         acceleration = recovery + self.sampled.c @ self._states + self.sampled.d @ off[:size]
-        if (np.abs(acceleration) > ROUNDING * limit).any():
+        if (np.abs(acceleration) > ROUNDING * limit)[limit > 0.0].any():
             self.recovery.begin(error)
             acceleration = self.recovery.acceleration(limit)
             off, self._states = np.zeros(6), np.zeros_like(self._states)

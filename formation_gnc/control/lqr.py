@@ -101,8 +101,7 @@ class LinearQuadraticRegulator(Controller[LqrParameters]):
         """(N, 3, n) the gains of a finite horizon or along the orbit, `interval` s apart."""
         self.interval = self.tick
         try:
-            thrust_weight = vehicle.mass**2 * parameters.thrust_matrix()
-            weights = Weights.scaled(parameters.joint_matrix(), thrust_weight, self.tick)
+            weights = Weights.scaled(parameters.joint_matrix(), parameters.effort(vehicle), self.tick)
             if model.is_time_invariant:
                 self._design_time_invariant(parameters, model, weights)
             else:

@@ -132,6 +132,7 @@ class ModelPredictiveController(Controller[MpcParameters]):
             )
         except DesignError as error:
             raise DesignError(f"mpc: fallback law: {error}") from error
+        self._effort = parameters.effort(vehicle)
         self.plan = np.empty((0, 3))
         """(M, 3) forces of the plan in force, N, held over its steps; empty before the first plan."""
         self._planned_at = 0
@@ -151,6 +152,11 @@ class ModelPredictiveController(Controller[MpcParameters]):
         if self._steps > parameters.horizon:
             allowed = f"it must be at most horizon, {parameters.horizon}"
             raise DesignError(f"mpc: control_horizon is {self._steps} steps; {allowed}")
+        if parameters.off_in_eclipse and parameters.thrust_rate > 0.0 and parameters.replan_interval > 0.0:
+            raise DesignError(
+                "mpc: off_in_eclipse and thrust_rate contradict each other in a plan that is kept for "
+                f"{parameters.replan_interval:g} s; replan_interval must be 0, so that the thrust ends in time"
+            )
         eclipse = longest_eclipse(common.chief)
         if parameters.off_in_eclipse and eclipse >= self._steps * parameters.step:
             raise DesignError(
@@ -180,7 +186,7 @@ class ModelPredictiveController(Controller[MpcParameters]):
             terminal = np.array([state_weight])
             return PlanCost(0.0 * state_weight, terminal, self._unit**2 * thrust_weight, absolute)
         ticks_per_step = parameters.step / tick
-        weights = Weights.scaled(state_weight, self._mass**2 * thrust_weight, tick)
+        weights = Weights.scaled(state_weight, self._effort, tick)
         grid = model.period / intervals * np.arange(intervals)
         middles = grid + 0.5 * grid[min(1, intervals - 1)]
         repeats = max(1, round(model.period / intervals / tick)) if intervals > 1 else 1
@@ -217,7 +223,7 @@ class ModelPredictiveController(Controller[MpcParameters]):
                     KEEP_OUT_WEIGHT * self.qps[0].scale,
                 )
             )
-        box = ThrustBox(limit, steps, self._step_ns, self._tick_ns, parameters.off_in_eclipse)
+        box = ThrustBox(limit, steps, self._step_ns, self._tick_ns, parameters.off_in_eclipse, self._rate)
         return box, others
 
     def figures(self) -> dict[str, Any]:

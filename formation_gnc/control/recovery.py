@@ -58,10 +58,10 @@ class RecoveryTrajectory:
         if self.state is None:
             return np.zeros(3)
         most = np.sqrt(np.einsum("i,njik,k->nj", self.state, self._levels, self.state))
-        within = (most <= limit).all(axis=1)
+        within = (most <= limit)[:, limit > 0.0].all(axis=1)
         gain = self._gains[int(np.argmax(within)) if within.any() else -1]
         self._acceleration = np.clip(-gain @ self.state, -limit, limit)
-        if (np.abs(self._acceleration) < NEGLIGIBLE * limit).all():
+        if (np.abs(self._acceleration) <= NEGLIGIBLE * limit).all():
             self.state, self._acceleration = None, np.zeros(3)
         return self._acceleration
 
