@@ -166,8 +166,8 @@ class FiniteHorizonController[P: FiniteHorizonParameters](Controller[P]):
             reason = f"{failure}; LQR active" if failure else held.fallback
             return Command(held.force, "holding", new.iterations if new else 0, 0.0, reason)
         planned = current.plan.mean(since, since + self._tick)
-        held = held_over_tick(planned, estimate.chief_state, self._tick)
-        force = estimate.mass * np.where(self._limit > 0.0, held, 0.0)
+        steady = held_over_tick(planned, estimate.chief_state, self._tick)
+        force = estimate.mass * np.where(self._limit > 0.0, steady, 0.0)
         reason = f"{current.failure}; previous plan continues" if current.failure else ""
         if new is None:
             return Command(force, "following", fallback=reason)
