@@ -14,7 +14,7 @@ from bench.result import Result
 from formation_gnc.common import CommonParameters, Orbit
 from formation_gnc.control.controller import Controller, Vehicle
 from formation_gnc.control.mpc import ModelPredictiveController, MpcParameters
-from formation_gnc.control.osqp_session import SETTINGS
+from formation_gnc.control.plan_solver import SETTINGS
 from formation_gnc.control.registry import ALGORITHMS, FINITE_HORIZONS
 from formation_gnc.control.weights import QuadraticWeights
 from formation_gnc.orbit.elements import Elements, state_from_elements
@@ -71,7 +71,7 @@ def fly(law: Controller[Any], start: NDArray[np.float64] = START) -> tuple[NDArr
 def qps() -> tuple[NDArray[np.float64], list[dict[str, Any]], tuple[Any, Any]]:
     """Times of the MPC's commands, the QPs that it solved, and their matrices."""
     law = ModelPredictiveController(MpcParameters(**BRYSON), MISSION, VEHICLE)
-    solver, asked = law.session.solver, []
+    solver, asked = law.solver.workspace, []
 
     class Recorder:
         """The solver, with a record of its updates."""
@@ -83,10 +83,10 @@ def qps() -> tuple[NDArray[np.float64], list[dict[str, Any]], tuple[Any, Any]]:
         def __getattr__(self, name: str) -> Any:
             return getattr(solver, name)
 
-    law.session.solver = Recorder()
+    law.solver.workspace = Recorder()
     fly(law)
     plain = ModelPredictiveController(MpcParameters(**BRYSON), MISSION, VEHICLE)
-    return fly(plain)[0], asked, law.session.matrices
+    return fly(plain)[0], asked, law.solver.matrices
 
 
 def solve_all(asked: list[dict[str, Any]], solve: Callable[[dict[str, Any]], Any]) -> NDArray[np.float64]:

@@ -14,9 +14,9 @@ class PlanCost:
     """Cost of a plan: the errors at the ends of its steps, and the forces."""
 
     running: Matrix
-    """(6, 6) weight of the error at the end of every step."""
+    """(6, 6) weight of the error at the end of every step but the last."""
     terminal: Matrix
-    """(K, 6, 6) further weight at the end of the horizon, at K equal intervals of the orbit; K is 1 if constant."""
+    """(K, 6, 6) weight at the end of the horizon, at K equal intervals of the orbit; K is 1 if constant."""
     thrust: Matrix
     """(3, 3) weight of the scaled force of a step."""
     absolute: bool
@@ -63,7 +63,7 @@ class CondensedQp:
                 response[:, 3 * step : 3 * step + 3] += gamma[step]
             free[step], forced[step] = state, response
         weight = np.repeat(cost.running[None], horizon, axis=0)
-        weight[-1] += terminal
+        weight[-1] = terminal
         weighted = (weight @ forced).reshape(6 * horizon, count)
         unforced = free.reshape(6 * horizon, 6)
         stacked = forced.reshape(6 * horizon, count)

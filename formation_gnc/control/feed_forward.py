@@ -41,7 +41,8 @@ class FeedForward:
 
     def _free_motion(self, estimate: NavigationState, state: Vector, ahead: float) -> Vector:
         if self._kind == "linear":
-            return self._model.propagate(estimate.time / NANOSECONDS, state, ahead)
+            time = self._model.time_at(estimate.chief_state, estimate.time / NANOSECONDS)
+            return self._model.propagate(time, state, ahead)
         steps = ceil(ahead / MAX_STEP)
         chief, deputy = estimate.chief_state, inertial_from_relative(estimate.chief_state, state)
         return relative_from_inertial(

@@ -12,7 +12,7 @@ from formation_gnc.common import CommonParameters
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
 from formation_gnc.control.lqr import LinearQuadraticRegulator, LqrParameters
 from formation_gnc.control.models import PLAN_MODELS
-from formation_gnc.control.plan import Plan, Task
+from formation_gnc.control.plan import Plan, Task, held_over_tick
 from formation_gnc.control.target_prediction import has_jumped, target_after
 from formation_gnc.control.weights import QuadraticWeights
 from formation_gnc.errors import ConfigurationError, DesignError
@@ -150,7 +150,7 @@ class FiniteHorizonController[P: FiniteHorizonParameters](Controller[P]):
             self._current, self._target = handover.law._current, handover.law._target
 
     def command(self, estimate: NavigationState, target: Target) -> Command:
-        """The mean force of the plan in force over this tick, or that of the holding LQR."""
+        """The plan's mean force over this tick, as the plant holds it, or that of the holding LQR."""
         if self._current is None or has_jumped(self._target, target):
             self._current = _Reconfiguration(estimate.time)
         self._target = target
@@ -165,7 +165,9 @@ class FiniteHorizonController[P: FiniteHorizonParameters](Controller[P]):
                 failure = f"final_time is past by {-to_go:g} s"
             reason = f"{failure}; LQR active" if failure else held.fallback
             return Command(held.force, "holding", new.iterations if new else 0, 0.0, reason)
-        force = estimate.mass * current.plan.mean(since, since + self._tick)
+        planned = current.plan.mean(since, since + self._tick)
+        steady = held_over_tick(planned, estimate.chief_state, self._tick)
+        force = estimate.mass * np.where(self._limit > 0.0, steady, 0.0)
         reason = f"{current.failure}; previous plan continues" if current.failure else ""
         if new is None:
             return Command(force, "following", fallback=reason)

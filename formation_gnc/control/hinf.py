@@ -1,5 +1,6 @@
 """H-infinity control by mixed-sensitivity synthesis."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,11 +12,18 @@ from formation_gnc.control.controller import Command, Controller, Handover, Vehi
 from formation_gnc.control.linear import LinearController
 from formation_gnc.control.mixed_sensitivity import MixedSensitivityProblem, WeightingFunction
 from formation_gnc.control.models import DESIGN_MODELS, TIME_INVARIANT_MODELS
+from formation_gnc.control.recovery import RecoveryTrajectory
 from formation_gnc.control.riccati import spectral_radius
 from formation_gnc.errors import DesignError
 from formation_gnc.parameters import parameter
 from formation_gnc.records import NavigationState, Target
 from formation_gnc.types import Matrix, Vector
+
+RECOVERY_BANDWIDTH = 4.0
+"""Bandwidth of the fastest recovery from saturation over the required bandwidth."""
+
+ROUNDING = 1.0 + 1e-9
+"""Share of the limit above which a force saturates: one handed over at the limit does not."""
 
 
 @dataclass(frozen=True)
@@ -111,17 +119,24 @@ class HInfinityController(Controller[HinfParameters]):
     Plant poles on the imaginary axis are regularised by a disturbance at the plant's input, or by Neokleous'
     pole shift, which then remains in the controller.
 
-    At activation, and whenever the thrust saturates (anti-windup), the controller's states are reset: of all
-    states that yield the applied force, those with the least closed-loop cost-to-go.
+    At activation the controller's states are those of least closed-loop cost-to-go that yield the force
+    commanded before. When the thrust would saturate (anti-windup), the error becomes a trajectory to the target
+    that the thrusters can fly (`RecoveryTrajectory`), and the controller acts on the difference from it.
 
-    Assumes: near-circular chief; separation much smaller than its radius; a target that needs little thrust;
-    errors within the authority of the thrusters, far beyond which no high-gain linear law recovers.
+    Assumes: near-circular chief; separation much smaller than its radius; a target that needs little thrust.
     """
 
     Parameters = HinfParameters
 
     def __init__(self, parameters: HinfParameters, common: CommonParameters, vehicle: Vehicle) -> None:
-        """Synthesise; raises DesignError if no gamma is feasible or the sampled loop is unstable."""
+        """Synthesise.
+
+        Raises:
+            DesignError: no feasible gamma, an unstable sampled loop, or no radial or along-track thruster.
+        """
+        if not (vehicle.thrust_limit[:2] > 0.0).all():
+            limits = vehicle.thrust_limit[:2].tolist()
+            raise DesignError(f"hinf: thrust_limit in the orbit plane (x, y) is {limits}; both must be above 0")
         model = DESIGN_MODELS[parameters.model](common)
         own = {name: np.array(value) for name, value in vars(parameters).items() if isinstance(value, tuple)}
         self.problem = MixedSensitivityProblem(
@@ -140,11 +155,15 @@ class HInfinityController(Controller[HinfParameters]):
                 parameters.form == "full_information", parameters.gamma_margin
             )
             self.sampled = self.continuous.discretised(common.tick)
-            self._design_reset(*model.discretise(0.0, common.tick))
+            phi, gamma = model.discretise(0.0, common.tick)
+            self._design_activation(phi, gamma)
+            fastest = RECOVERY_BANDWIDTH * max(parameters.bandwidth)
+            self.recovery = RecoveryTrajectory(phi, gamma, common.tick, math.tau / model.period, fastest)
+            """The recovery from saturation in progress."""
         except DesignError as error:
             raise DesignError(f"hinf: {error}") from error
 
-    def _design_reset(self, phi: Matrix, gamma: Matrix) -> None:
+    def _design_activation(self, phi: Matrix, gamma: Matrix) -> None:
         """Set the maps of `_states_for`: cost-to-go V of the sampled loop, minimised over the controller's states.
 
         V solves the Lyapunov equation with the stage cost |y|^2 + |w_u u|^2.
@@ -206,19 +225,23 @@ class HInfinityController(Controller[HinfParameters]):
         self._force = handover.force
 
     def command(self, estimate: NavigationState, target: Target) -> Command:
-        """Output of the controller, whose states advance by a tick."""
+        """Output of the controller, whose states advance by a tick, plus the recovery's acceleration."""
         error = estimate.relative_state - target.relative_state
-        output = error[: self.sampled.b.shape[1]]
+        limit, size = self._limit / estimate.mass, self.sampled.b.shape[1]
+        recovery = self.recovery.acceleration(limit)
+        off = error if self.recovery.state is None else error - self.recovery.state
         if self._states is None:
-            self._states = self._states_for(error, self._force / estimate.mass)
-        force = estimate.mass * (self.sampled.c @ self._states + self.sampled.d @ output)
-        applied = np.clip(force, -self._limit, self._limit)
-        if (applied != force).any():
-            self._states = self._states_for(error, applied / estimate.mass)
-        states = self.sampled.a @ self._states + self.sampled.b @ output
+            self._states = self._states_for(off, self._force / estimate.mass - recovery)
+        acceleration = recovery + self.sampled.c @ self._states + self.sampled.d @ off[:size]
+        if (np.abs(acceleration) > ROUNDING * limit)[limit > 0.0].any():
+            self.recovery.begin(error)
+            acceleration = self.recovery.acceleration(limit)
+            off, self._states = np.zeros(6), np.zeros_like(self._states)
+        states = self.sampled.a @ self._states + self.sampled.b @ off[:size]
         # Reinitialise after an overflow.
         self._states = states if np.isfinite(states).all() else None
-        return Command(force)
+        self.recovery.advance()
+        return Command(estimate.mass * acceleration)
 
     def _states_for(self, error: Vector, acceleration: Vector) -> Vector:
         """Controller states of least cost-to-go that yield an acceleration (3,) at an error (6,)."""

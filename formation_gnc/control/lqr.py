@@ -69,7 +69,8 @@ class LinearQuadraticRegulator(Controller[LqrParameters]):
 
     Tracks the target: u = -K (x - x_target) + feed-forward, with K from a Riccati equation (Neokleous
     4.29-4.30, sign of 4.33 corrected; Roberts 38-40) for the model discretised exactly with thrust held over a
-    tick. A gain that varies along the orbit is tabulated in the design and interpolated in flight.
+    tick. A gain that varies along the orbit is tabulated in the design and interpolated in flight, at the phase of
+    the estimated chief.
 
     With `integral_error`, the state is augmented by the integral of the position error: an axis at its thrust
     limit does not integrate, and a change of parameters keeps the integral.
@@ -86,7 +87,7 @@ class LinearQuadraticRegulator(Controller[LqrParameters]):
             DesignError: inadmissible weights, a kind of gain that does not suit the model, or no stabilising
                 solution.
         """
-        model = DESIGN_MODELS[parameters.model](common)
+        model = self._model = DESIGN_MODELS[parameters.model](common)
         self.tick = common.tick
         self._limit, self._mass = vehicle.thrust_limit.tolist(), vehicle.mass
         self._integrates = parameters.integrates
@@ -100,8 +101,7 @@ class LinearQuadraticRegulator(Controller[LqrParameters]):
         """(N, 3, n) the gains of a finite horizon or along the orbit, `interval` s apart."""
         self.interval = self.tick
         try:
-            thrust_weight = vehicle.mass**2 * parameters.thrust_matrix()
-            weights = Weights.scaled(parameters.joint_matrix(), thrust_weight, self.tick)
+            weights = Weights.scaled(parameters.joint_matrix(), parameters.effort(vehicle), self.tick)
             if model.is_time_invariant:
                 self._design_time_invariant(parameters, model, weights)
             else:
@@ -145,7 +145,7 @@ class LinearQuadraticRegulator(Controller[LqrParameters]):
         return with_integral(*matrices, np.eye(3), self.tick) if self._integrates else matrices
 
     def gain_at(self, time: int) -> Matrix:
-        """Gain K (3, n) at a time of the run (ns): acceleration per m, m/s and m s of error."""
+        """Gain K (3, n) at a time of the run, or of the model (ns): acceleration per m, m/s and m s of error."""
         if not len(self.gains):
             return self.gain
         if self._finite:
@@ -182,9 +182,12 @@ class LinearQuadraticRegulator(Controller[LqrParameters]):
             self._start = estimate.time
         error: list[float] = (estimate.relative_state - target.relative_state).tolist()
         feed_forward, reason = self._feed_forward(estimate, target)
+        time = estimate.time
+        if len(self.gains) and not self._finite:
+            time = round(self._model.time_at(estimate.chief_state, time / NANOSECONDS) * NANOSECONDS)
         force = [
             estimate.mass * (acceleration - sumprod(row, error + self._integral))
-            for row, acceleration in zip(self.gain_at(estimate.time).tolist(), feed_forward.tolist(), strict=True)
+            for row, acceleration in zip(self.gain_at(time).tolist(), feed_forward.tolist(), strict=True)
         ]
         if self._integrates:
             self._integral = integrated(self._integral, error[:3], force, self._limit, self.tick)

@@ -21,7 +21,7 @@ from formation_gnc.control.mpc_constraints import (
     ThrustRate,
     TotalThrust,
 )
-from formation_gnc.control.osqp_session import OsqpSession, SolverError
+from formation_gnc.control.plan_solver import PlanSolver, SolverError
 from formation_gnc.control.riccati import Weights, periodic_cost_to_go
 from formation_gnc.control.weights import QuadraticWeights
 from formation_gnc.errors import DesignError
@@ -132,6 +132,7 @@ class ModelPredictiveController(Controller[MpcParameters]):
             )
         except DesignError as error:
             raise DesignError(f"mpc: fallback law: {error}") from error
+        self._effort = parameters.effort(vehicle)
         self.plan = np.empty((0, 3))
         """(M, 3) forces of the plan in force, N, held over its steps; empty before the first plan."""
         self._planned_at = 0
@@ -140,7 +141,7 @@ class ModelPredictiveController(Controller[MpcParameters]):
         self._rate: ThrustRate | None = None
         box, others = self._make_constraints()
         self._constraints = (box, *others)
-        self.session = OsqpSession(self.qps[0], box, others)
+        self.solver = PlanSolver(self.qps[0], box, others)
 
     def _check_horizons(self, common: CommonParameters) -> None:
         parameters = self._parameters
@@ -151,6 +152,11 @@ class ModelPredictiveController(Controller[MpcParameters]):
         if self._steps > parameters.horizon:
             allowed = f"it must be at most horizon, {parameters.horizon}"
             raise DesignError(f"mpc: control_horizon is {self._steps} steps; {allowed}")
+        if parameters.off_in_eclipse and parameters.thrust_rate > 0.0 and parameters.replan_interval > 0.0:
+            raise DesignError(
+                "mpc: off_in_eclipse and thrust_rate contradict each other in a plan that is kept for "
+                f"{parameters.replan_interval:g} s; replan_interval must be 0, so that the thrust ends in time"
+            )
         eclipse = longest_eclipse(common.chief)
         if parameters.off_in_eclipse and eclipse >= self._steps * parameters.step:
             raise DesignError(
@@ -180,7 +186,7 @@ class ModelPredictiveController(Controller[MpcParameters]):
             terminal = np.array([state_weight])
             return PlanCost(0.0 * state_weight, terminal, self._unit**2 * thrust_weight, absolute)
         ticks_per_step = parameters.step / tick
-        weights = Weights.scaled(state_weight, self._mass**2 * thrust_weight, tick)
+        weights = Weights.scaled(state_weight, self._effort, tick)
         grid = model.period / intervals * np.arange(intervals)
         middles = grid + 0.5 * grid[min(1, intervals - 1)]
         repeats = max(1, round(model.period / intervals / tick)) if intervals > 1 else 1
@@ -217,7 +223,7 @@ class ModelPredictiveController(Controller[MpcParameters]):
                     KEEP_OUT_WEIGHT * self.qps[0].scale,
                 )
             )
-        box = ThrustBox(limit, steps, self._step_ns, self._tick_ns, parameters.off_in_eclipse)
+        box = ThrustBox(limit, steps, self._step_ns, self._tick_ns, parameters.off_in_eclipse, self._rate)
         return box, others
 
     def figures(self) -> dict[str, Any]:
@@ -227,7 +233,7 @@ class ModelPredictiveController(Controller[MpcParameters]):
             "horizon [s]": parameters.step * parameters.horizon,
             "steps": parameters.horizon,
             "steps with thrust": self._steps,
-            **self.session.figures(),
+            **self.solver.figures(),
             **self.fallback_law.figures(),
         }
 
@@ -275,18 +281,20 @@ class ModelPredictiveController(Controller[MpcParameters]):
         """Plan from an estimate; raises SolverError."""
         if not np.abs(estimate.relative_state - target.relative_state).max() < MAX_ERROR:
             raise SolverError("error out of range")
-        qp = self._qp_at(estimate.time)
+        qp = self._qp_at(estimate)
         gradient, cost_of_free_motion = qp.tracking(estimate, target, self._step_ns)
-        solution = self.session.solve(PlanInputs(qp, estimate, target, self.plan), gradient)
+        inputs = PlanInputs(qp, estimate, target, self.plan)
+        solution = self.solver.solve(inputs, gradient, 0.5 * qp.scale * cost_of_free_motion)
         self.plan = self._unit * solution.forces
         self._planned_at = estimate.time
-        cost = 2.0 * solution.objective / qp.scale + cost_of_free_motion
-        return Command(self.plan[0], solution.status, solution.iterations, float(cost))
+        return Command(self.plan[0], solution.status, solution.iterations, 2.0 * solution.cost / qp.scale)
 
-    def _qp_at(self, time: int) -> CondensedQp:
+    def _qp_at(self, estimate: NavigationState) -> CondensedQp:
+        """The QP nearest to the phase of the estimated chief."""
         if len(self.qps) == 1:
             return self.qps[0]
-        position = time / NANOSECONDS / self._model.period * len(self.qps)
+        time = self._model.time_at(estimate.chief_state, estimate.time / NANOSECONDS)
+        position = time / self._model.period * len(self.qps)
         return self.qps[round(position) % len(self.qps)]
 
 

@@ -16,6 +16,9 @@ from formation_gnc.control.condensed_qp import CondensedQp
 from formation_gnc.records import NavigationState, Target
 from formation_gnc.types import NANOSECONDS, Matrix, Vector
 
+LEFT = 1e-2
+"""Force over the force unit that the solver's accuracy may leave when an eclipse begins; it is cut then."""
+
 
 @dataclass(slots=True)
 class PlanInputs:
@@ -73,13 +76,20 @@ class Constraint(ABC):
 
 
 class ThrustBox(Constraint):
-    """Force limit per axis; with `off_in_eclipse` zero in every step and tick that meets a predicted eclipse."""
+    """Force limit per axis; with `off_in_eclipse` zero in every step and tick that meets a predicted eclipse.
 
-    def __init__(self, limit: Vector, steps: int, step: int, tick: int, off_in_eclipse: bool) -> None:
+    With a limit on the thrust rate, a step in which an eclipse begins is limited to what the ticks until then can
+    take back: so it can be zero in time, whenever the plan is renewed. What the solver's accuracy has left above that
+    is taken back as fast as possible.
+    """
+
+    def __init__(
+        self, limit: Vector, steps: int, step: int, tick: int, off_in_eclipse: bool, rate: "ThrustRate | None" = None
+    ) -> None:
         """Limit (3,) over the force unit; length of the plan's steps and of the tick in ns."""
         self._box = np.tile(limit, steps)
         self._steps, self._step, self._tick = steps, step, tick
-        self._off_in_eclipse = off_in_eclipse
+        self._off_in_eclipse, self._rate = off_in_eclipse, rate
         self.is_constant = not off_in_eclipse
 
     def rows(self) -> tuple[sparse.csc_array, sparse.csc_array]:
@@ -92,9 +102,21 @@ class ThrustBox(Constraint):
         box = self._box
         if self._off_in_eclipse:
             dark = in_eclipse(inputs.estimate.time, self._step, self._steps, inputs.target)
-            box = box.copy()
-            box[np.repeat(dark, 3)] = 0.0
+            largest = np.full((self._steps, 3), np.inf)
+            largest[dark] = 0.0 if self._rate is None else self._ramp(self._rate, inputs)[dark]
+            box = np.minimum(box, largest.ravel())
         return Bounds(-box, box)
+
+    def _ramp(self, rate: "ThrustRate", inputs: PlanInputs) -> Matrix:
+        """(steps, 3) largest force from which the ticks until the next eclipse lead to zero."""
+        steps, eclipses = np.arange(self._steps)[:, None], inputs.target.eclipses
+        begin = inputs.estimate.time + self._step * steps
+        ticks = np.where(eclipses[:, 1] > begin, (eclipses[:, 0] - begin) // self._tick, np.inf).min(axis=1)
+        change = rate.change / rate.unit
+        in_time = change * np.maximum(ticks, 0.0)[:, None]
+        fastest = np.abs(rate.previous) / rate.unit - change * (1.0 + self._step // self._tick * steps)
+        result: Matrix = np.clip(fastest, in_time, in_time + LEFT)
+        return result
 
     def clip(self, force: Vector, time: int, target: Target) -> Vector:
         """Zero in eclipse."""
@@ -138,10 +160,11 @@ class ThrustRate(Constraint):
 
     def __init__(self, rate: float, unit: float, steps: int, change_time: int, tick: int) -> None:
         """Rate in N/s and force unit in N; time available for a change between steps and length of the tick in ns."""
-        self._change = rate * tick / NANOSECONDS
-        self._unit, self._count = unit, 3 * steps
+        self.change = rate * tick / NANOSECONDS
+        """Largest change of the force from tick to tick, N."""
+        self.unit, self._count = unit, 3 * steps
         self._scaled_change = np.full(3 * steps, rate * change_time / NANOSECONDS / unit)
-        self._scaled_change[:3] = self._change / unit
+        self._scaled_change[:3] = self.change / unit
         self.previous: Vector = np.zeros(3)
         """(3,) force commanded at the previous tick, N."""
 
@@ -153,12 +176,12 @@ class ThrustRate(Constraint):
     def bounds(self, inputs: PlanInputs) -> Bounds:
         """The largest changes, the first of them from the previous force."""
         middle = np.zeros(self._count)
-        middle[:3] = self.previous / self._unit
+        middle[:3] = self.previous / self.unit
         return Bounds(middle - self._scaled_change, middle + self._scaled_change)
 
     def clip(self, force: Vector, time: int, target: Target) -> Vector:
         """Within the largest change from the previous force."""
-        return np.clip(force, self.previous - self._change, self.previous + self._change)
+        return np.clip(force, self.previous - self.change, self.previous + self.change)
 
 
 class ThrustMagnitude(Constraint):

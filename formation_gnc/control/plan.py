@@ -1,9 +1,11 @@
 """A reconfiguration to plan, and the thrust history that performs it."""
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from formation_gnc.orbit.frames import hill_rate
 from formation_gnc.relative.model import RelativeModel
 from formation_gnc.types import Matrix, Vector
 
@@ -45,7 +47,7 @@ class Plan:
     """A thrust history from the time at which it was planned."""
 
     acceleration: Matrix
-    """(N, 3) held over N equal steps, Hill frame, m/s^2."""
+    """(N, 3) held over N equal steps in the Hill frame, with which it turns, m/s^2."""
     duration: float
     """Total length of the steps, s."""
     iterations: int = 1
@@ -65,3 +67,24 @@ class Plan:
         moved = [np.interp(end, knots, axis) - np.interp(begin, knots, axis) for axis in impulse.T]
         mean: Matrix = np.stack(moved, axis=-1) / np.asarray(np.subtract(end, begin))[..., None]
         return mean
+
+
+def held_over_tick(acceleration: Vector, chief: Vector, tick: float) -> Vector:
+    """The inertially held acceleration (3,), in the Hill axes of the tick's start, with the impulse of a turning one.
+
+    Models and plans hold an acceleration in the Hill frame, which turns about the orbit normal by an angle a over the
+    tick (s); the plant holds it in the axes of the start. The mean of the turning one is turned by a / 2, and less by
+    the factor sin(a / 2) / (a / 2).
+
+    Args:
+        acceleration: (3,) held in the Hill frame, m/s^2.
+        chief: (6,) inertial state of the chief at the tick's start, m and m/s.
+        tick: length of the tick, s.
+    """
+    rate, place = hill_rate(chief), chief[:3]
+    # The rate w changes by -2 w (r v / r^2) a second, w': the mean angle is w T / 2 + w' T^2 / 6.
+    half = 0.5 * rate * tick * (1.0 - 2.0 / 3.0 * float(place @ chief[3:]) / float(place @ place) * tick)
+    sine, cosine = math.sin(half), math.cos(half)
+    x, y, z = acceleration.tolist()
+    share = sine / half if half else 1.0
+    return np.array([share * (cosine * x - sine * y), share * (sine * x + cosine * y), z])

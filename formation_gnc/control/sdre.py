@@ -85,8 +85,7 @@ class Sdre(Controller[SdreParameters]):
         self._failure = ""
         self._updated_at: int | None = None
         try:
-            r = vehicle.mass**2 * parameters.thrust_matrix()
-            self._weights = Weights.scaled(parameters.joint_matrix(), r, common.tick)
+            self._weights = Weights.scaled(parameters.joint_matrix(), parameters.effort(vehicle), common.tick)
         except DesignError as error:
             raise DesignError(f"sdre: {error}") from error
         self.fallback_law = LinearQuadraticRegulator(LqrParameters(**parameters.weights()), common, vehicle)

@@ -29,25 +29,22 @@ class SdreFiniteParameters(FiniteHorizonParameters):
 
 
 class FiniteSdre(FiniteHorizonController[SdreFiniteParameters]):
-    """Finite-horizon SDRE: fixed end-point LQ with A(x) frozen at the current state, replanned (Joshi 5.2).
+    """Finite-horizon SDRE: fixed end-point LQ with A(x, t) frozen at the current state, replanned (Joshi 5.2).
 
     The Hamiltonian transition matrix over the time to go yields the costate that reaches the goal,
-    (5.13)-(5.16) with the sign of (5.11) corrected. Replanning removes the error of the frozen matrices.
+    (5.13)-(5.16) with the sign of (5.11) corrected. The state is frozen, the chief's motion is not: it is known.
+    Replanning removes the error of the frozen state.
 
-    Assumes: matrices that vary little over the time to go; the model's assumptions.
+    Assumes: a distance much smaller than the chief's radius; the model's assumptions.
     """
 
     Parameters = SdreFiniteParameters
 
     def plan(self, task: Task) -> Plan:
-        """The optimal trajectory of the frozen linear system."""
-        a, b = state_dependent(task.model, self.parameters.factorisation, np.array([task.time]))(task.state[None])
-        phi, gamma = discretise(np.repeat(a, 3, axis=0), np.repeat(b, 3, axis=0), task.step)
-        found = solve_fixed_endpoint(
-            np.broadcast_to(phi, (task.steps, 6, 6)),
-            np.broadcast_to(gamma, (task.steps, 6, 3)),
-            task.state,
-            task.goal,
-            Cost(np.zeros((6, 6)), task.step * task.effort, task.slack),
-        )
+        """The optimal trajectory of the linear system at the frozen state."""
+        times = np.asarray(task.time + 0.5 * task.step * np.arange(2 * task.steps + 1))
+        frozen = np.broadcast_to(task.state, (len(times), 6))
+        a, b = state_dependent(task.model, self.parameters.factorisation, times)(frozen)
+        cost = Cost(np.zeros((6, 6)), task.step * task.effort, task.slack)
+        found = solve_fixed_endpoint(*discretise(a, b, task.step), task.state, task.goal, cost)
         return Plan(found.inputs, task.duration)

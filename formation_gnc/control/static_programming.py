@@ -7,7 +7,7 @@ terminal error to first order. At convergence the first-order optimality conditi
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,7 +31,7 @@ class StaticPlan(Plan):
 
     history: Matrix
     """Decision variables. MPSP: `acceleration` itself. G-MPSP: (2 N + 1, 3) acceleration at the ends and
-    middles of N steps; `acceleration` holds its mean over half steps."""
+    middles of N steps; `acceleration` is held over parts of the steps and reaches the same state."""
     errors: Matrix
     """(iterations + 1, 6) terminal error of the guess and after each iteration."""
 
@@ -71,12 +71,15 @@ def mpsp(task: Task, tolerance: Vector, max_iterations: int = 20, method: str = 
 
         return states[-1], sensitivities
 
-    history, errors, failure = _solve(task, guess, predict, np.full(task.steps, task.step), tolerance, max_iterations)
+    shares = np.full(task.steps, task.step)
+    history, errors, failure, _ = _solve(task, guess, predict, shares, tolerance, max_iterations)
     return StaticPlan(history, task.duration, len(errors) - 1, failure, history=history, errors=errors)
 
 
-def gmpsp(task: Task, tolerance: Vector, max_iterations: int = 20) -> StaticPlan:
+def gmpsp(task: Task, tolerance: Vector, max_iterations: int = 20, pieces: int = 2) -> StaticPlan:
     """G-MPSP, Joshi (7.1)-(7.23), from the task's guess or zero thrust; arguments as for `mpsp`.
+
+    `pieces` is the number of equal parts of a step over which the result is held.
 
     The weighting matrix W is integrated backwards in continuous time (7.10)-(7.11); the integrals A_lambda and
     b_lambda (7.19)-(7.20) use Simpson's rule, of order four like the prediction.
@@ -111,9 +114,31 @@ def gmpsp(task: Task, tolerance: Vector, max_iterations: int = 20) -> StaticPlan
 
         return states[-1], sensitivities
 
-    history, errors, failure = _solve(task, start, predict, shares, tolerance, max_iterations)
-    held = 0.5 * (history[:-1] + history[1:])
+    history, errors, failure, sensitivity = _solve(task, start, predict, shares, tolerance, max_iterations)
+    held = history[:-1] if sensitivity is None else _held(task, history, sensitivity, shares, pieces)
     return StaticPlan(held, task.duration, len(errors) - 1, failure, history=history, errors=errors)
+
+
+def _held(task: Task, history: Matrix, sensitivity: Matrix, shares: Vector, pieces: int) -> Matrix:
+    """(pieces N, 3) accelerations held over pieces of the steps that reach what the continuous (2 N + 1, 3) one does.
+
+    Its means, with the least change that makes up for the position which a hold loses.
+    """
+    held, response = _means(history, pieces), _means(sensitivity, pieces)
+    lengths = np.full(len(held), task.step / pieces)
+    reached = np.einsum("k,kij,kj->i", shares, sensitivity, history)
+    lost = np.einsum("k,kij,kj->i", lengths, response, held) - reached
+    change = _update(replace(task, slack=np.zeros((6, 6))), response, lengths, np.zeros_like(held), lost)
+    return held if change is None else held + change[0]
+
+
+def _means(values: Matrix, pieces: int) -> Matrix:
+    """(pieces N, ...) means over pieces of the parabolas through the ends and middles (2 N + 1, ...) of N steps."""
+    s = np.linspace(0.0, 1.0, pieces + 1)[:, None]
+    weights = pieces * np.diff(s * [1.0, 0.0, 0.0] + s**2 * [-1.5, 2.0, -0.5] + s**3 / 3.0 * [2.0, -4.0, 2.0], axis=0)
+    knots = np.stack([values[:-1:2], values[1::2], values[2::2]], axis=1)
+    means: Matrix = np.einsum("pk,nk...->np...", weights, knots)
+    return means.reshape(-1, *values.shape[1:])
 
 
 def lqr_guess(task: Task, model: RelativeModel, gain: Matrix) -> Matrix:
@@ -168,14 +193,15 @@ def _solve(
     shares: Vector,
     tolerance: Vector,
     max_iterations: int,
-) -> tuple[Matrix, Matrix, str]:
+) -> tuple[Matrix, Matrix, str, Matrix | None]:
     """Iterate prediction and update until the terminal error is as expected, or the iteration fails.
 
     At least one update: a guess may reach the goal at far more than the least effort.
 
-    Returns the history, the terminal errors (iterations + 1, 6) and the reason of failure, if any.
+    Returns the history, the terminal errors (iterations + 1, 6), the reason of failure, if any, and the
+    sensitivities of the last update, if any.
     """
-    history, expected, errors = guess, np.zeros(6), list[Vector]()
+    history, expected, errors, sensitivity = guess, np.zeros(6), list[Vector](), None
     with np.errstate(all="ignore"):
         while True:
             end, sensitivities = predict(history)
@@ -191,12 +217,13 @@ def _solve(
                 miss = np.linalg.norm(errors[-1][:3])
                 failure = f"{max_iterations} iterations leave {miss:.3g} m at the final time"
             else:
-                update = _update(task, sensitivities(), shares, history, errors[-1])
+                sensitivity = sensitivities()
+                update = _update(task, sensitivity, shares, history, errors[-1])
                 if update is not None:
                     history, expected = update
                     continue
                 failure = "A_lambda is singular: not every terminal state is reachable"
-            return history, np.array(errors), failure
+            return history, np.array(errors), failure, sensitivity
 
 
 def _update(

@@ -5,9 +5,19 @@ from typing import Any
 
 import numpy as np
 
+from formation_gnc.control.controller import Vehicle
 from formation_gnc.errors import DesignError
 from formation_gnc.parameters import parameter
 from formation_gnc.types import Matrix, Vector
+
+PROHIBITIVE = 1e12
+"""Factor of the cost of thrust along an axis without thruster."""
+
+
+def require_along_track(vehicle: Vehicle) -> None:
+    """Raise DesignError without an along-track thruster: no other stops a drift along the track."""
+    if not vehicle.thrust_limit[1] > 0.0:
+        raise DesignError("thrust_limit along the track (y) is 0; it must be above 0 to control the drift")
 
 
 @dataclass(frozen=True)
@@ -57,6 +67,22 @@ class QuadraticWeights:
     def thrust_matrix(self) -> Matrix:
         """R (3, 3) on force, 1/N^2; raises DesignError for a wrong number of elements."""
         return _matrix("thrust_weight", self.thrust_weight, self.thrust)
+
+    def effort(self, vehicle: Vehicle) -> Matrix:
+        """Weight (3, 3) on acceleration of a vehicle, prohibitive on an axis without thruster.
+
+        Along-track thrust alone controls the in-plane motion, so that the radial axis is dispensable. The cross-track
+        motion is coupled to nothing: without a thruster it is left to itself.
+
+        Raises:
+            DesignError: no along-track thruster, or a wrong number of elements.
+        """
+        require_along_track(vehicle)
+        effort: Matrix = vehicle.mass**2 * self.thrust_matrix()
+        if not vehicle.thrust_limit[0] > 0.0:
+            effort[0, 1:] = effort[1:, 0] = 0.0
+            effort[0, 0] *= PROHIBITIVE
+        return effort
 
     def weights(self) -> dict[str, Any]:
         """These fields by name, for the parameters of another law with the same cost."""

@@ -101,7 +101,9 @@ class Guidance(FlightModule[GuidanceParameters, TargetPath]):
             self._assign_slot(estimate)
         parameters = self.parameters
         ahead = _ahead(parameters.preview_step, parameters.preview_steps)
-        states = self.configuration.design.states(estimate.time / NANOSECONDS + ahead)
+        time = estimate.time / NANOSECONDS
+        path = self.configuration.design.anchored(estimate.chief_state, time)
+        states = path.states(time + ahead)
         if self._new_target is not None:
             self._report_target(self._new_target, estimate, states[0])
             self._new_target = None
@@ -217,12 +219,13 @@ class Guidance(FlightModule[GuidanceParameters, TargetPath]):
             and _is_plausible(estimate)
         ):
             return None
+        chief, time = estimate.chief_state, estimate.time / NANOSECONDS
         separation = predict(
-            self.configuration.design,
+            self.configuration.design.anchored(chief, time),
             target,
             estimate.relative_state,
             list(self._neighbour_states),
-            self._slots.paths,
+            {name: path.anchored(chief, time) for name, path in self._slots.paths.items()},
             parameters.separation_horizon,
             parameters.mean_motion,
         )

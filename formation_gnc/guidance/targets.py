@@ -3,6 +3,7 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from copy import copy
 from functools import partial
 from typing import Any
 
@@ -39,6 +40,10 @@ class TargetPath(ABC):
         """Propagate `formation`, prepared for the mean motion of `common`, from `phase` (rad) at time zero."""
         self._formation, self._phase, self._common = formation, phase, common
         self._ahead = phase / common.mean_motion
+
+    def anchored(self, chief: Vector, time: float) -> "TargetPath":
+        """The path about the orbit that the chief's inertial state (6,) at a time (s) is on; the same without one."""
+        return self
 
     @abstractmethod
     def states(self, times: Vector) -> Matrix:
@@ -112,7 +117,8 @@ class ModelPath(TargetPath):
     rates there, and the along-track rate that does not drift in the model, plus the formation's own drift.
     About an eccentric chief (Yamanaka and Ankersen) the radial motion then keeps the formation's shape in the
     true anomaly f, x = c1 sin f + c2 cos f; along and across the track the path is stretched with the chief's
-    distance. At the mean rates under J2 the phase follows the truth.
+    distance. At the mean rates under J2 the phase follows the truth; about an eccentric chief the path is anchored
+    to the estimated one, whose period and perigee J2 changes: its constants stay, by the true anomaly.
     """
 
     def __init__(
@@ -121,15 +127,33 @@ class ModelPath(TargetPath):
         """Start at time zero; raises OrbitError where the model does not exist about the chief."""
         super().__init__(formation, phase, common)
         self.model = model.about(common.chief_elements)
-        n, (in_plane, across) = common.mean_motion, self.model.phase_rates(0.0)
-        given = formation.states(np.array([self._ahead]))[0]
-        start = given * np.array([1.0, 1.0, 1.0, in_plane / n, 1.0, across / n])
-        self._start: Vector = self.model.bounded(0.0, start)
-        self._start[4] += given[4] + 2.0 * n * given[0]
+        self._start = self._start_in(self.model)
+        self._reference: tuple[LinearModel, Vector] | None = None
+        """The model anchored to the chief at time zero, and the start in it."""
+
+    def _start_in(self, model: LinearModel) -> Vector:
+        """(6,) state at time zero in a model."""
+        n, (in_plane, across) = self._common.mean_motion, model.phase_rates(0.0)
+        given = self._formation.states(np.array([self._ahead]))[0]
+        start: Vector = model.bounded(0.0, given * np.array([1.0, 1.0, 1.0, in_plane / n, 1.0, across / n]))
+        start[4] += given[4] + 2.0 * n * given[0]
+        return start
 
     def states(self, times: Vector) -> Matrix:
         """(N, 6) states by the model's transition matrices."""
         return self._transitions(0.0, times) @ self._start
+
+    def anchored(self, chief: Vector, time: float) -> TargetPath:
+        """With the same constants of motion about the orbit that the chief is seen on."""
+        model = self.model.anchored(chief, time)
+        if model is self.model:
+            return self  # a model without a perigee
+        if self._reference is None:
+            first = self.model.anchored(state_from_elements(self._common.chief_elements), 0.0)
+            self._reference = first, self._start_in(first)
+        path = copy(self)
+        path.model, path._start = model, model.continued(self._reference[1], self._reference[0])
+        return path
 
     def _transitions(self, time: float, ahead: Vector) -> Matrix:
         return self.model.transitions(time, ahead)

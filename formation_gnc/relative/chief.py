@@ -5,7 +5,7 @@
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from typing import Any
 
@@ -15,17 +15,22 @@ from formation_gnc.errors import OrbitError
 from formation_gnc.orbit.constants import MU
 from formation_gnc.orbit.elements import (
     Elements,
+    elements_from_state,
     mean_from_true_anomaly,
     state_from_elements,
     true_from_mean_anomaly,
 )
 from formation_gnc.orbit.frames import hill_rotation
 from formation_gnc.orbit.gravity import acceleration as gravity
+from formation_gnc.orbit.mean import mean_state
 from formation_gnc.orbit.propagation import propagate_with_transition
 from formation_gnc.relative.model import NO_THRUST, Array
 
 STEPS_PER_TURN = 200
 """Integration steps per revolution of a circular orbit at the perigee: rounding error at order eight."""
+
+DISTINCT_PERIGEE = 0.02
+"""Least mean eccentricity at which the perigee is defined, against what J2 does to it."""
 
 LATEST = 2048
 """Size of the caches of chief states."""
@@ -160,6 +165,27 @@ class KeplerChief(Chief):
         """Longest step of an integration to rounding error, s, set by the motion at the perigee."""
         return _step_at(self.semi_major_axis * (1.0 - self.eccentricity), self.mu)
 
+    def time_at(self, inertial: Array) -> float | None:
+        """Time within a period, s, at which the true anomaly is that of an inertial state (6,); None if it has none."""
+        anomaly = true_anomaly_of(inertial)
+        if anomaly is None:
+            return None
+        here, start = (mean_from_true_anomaly(each, self.eccentricity) for each in (anomaly, self.true_anomaly))
+        return (here - start) % math.tau / self.mean_motion
+
+    def seen(self, inertial: Array, time: float) -> "KeplerChief | None":
+        """The mean ellipse that an inertial state (6,) is on at a time (s); None if that has no distinct perigee.
+
+        The osculating one turns to and fro with every revolution under J2, by an angle of J2 over the eccentricity.
+        """
+        try:
+            ellipse = KeplerChief.of(elements_from_state(mean_state(inertial)))
+        except OrbitError:
+            return None
+        if ellipse.eccentricity < DISTINCT_PERIGEE:
+            return None
+        return replace(ellipse, true_anomaly=ellipse.anomaly(-time))
+
     def anomaly(self, time: float) -> float:
         """True anomaly at a time, rad, in [0, 2 pi)."""
         mean = mean_from_true_anomaly(self.true_anomaly, self.eccentricity) + self.mean_motion * time
@@ -193,6 +219,26 @@ class OblateChief(Chief):
     def at(self, time: float) -> ChiefState:
         """State at a time (s)."""
         return _oblate_state(self, time)
+
+
+def true_anomaly_of(inertial: Array) -> float | None:
+    """True anomaly (rad) on the osculating orbit of an inertial state (6,); None if it is on no orbit."""
+    place, velocity = inertial[:3].tolist(), inertial[3:].tolist()
+    (x, y, z), (vx, vy, vz) = place, velocity
+    momentum = y * vz - z * vy, z * vx - x * vz, x * vy - y * vx
+    square, radius = math.sumprod(momentum, momentum), math.sqrt(math.sumprod(place, place))
+    if not (0.0 < square < math.inf and 0.0 < radius < math.inf):
+        return None
+    radial_rate = math.sumprod(place, velocity) / radius
+    return math.atan2(math.sqrt(square) * radial_rate, square / radius - MU)
+
+
+def latitude_of(inertial: Array) -> float | None:
+    """Argument of latitude (rad) of an inertial state (6,); None if it is on no orbit."""
+    if true_anomaly_of(inertial) is None:
+        return None
+    pole = hill_rotation(inertial)[:, 2]
+    return math.atan2(pole[0], pole[1])
 
 
 def _step_at(perigee_radius: float, mu: float) -> float:

@@ -40,6 +40,10 @@ class J2GradientModel(LinearModel):
         """A hundredth of the nodal period, s."""
         return 0.01 * self.period
 
+    def time_at(self, chief: Array, time: float) -> float:
+        """Time at which the argument of latitude is that of an inertial state (6,)."""
+        return self.reference.time_at(chief, time)
+
     def dynamics(self, time: float, state: Array = ON_THE_CHIEF) -> Array:
         """(6, 6) continuous matrix A(t)."""
         n, rate = self.reference.mean_motion, self.reference.rate

@@ -89,6 +89,15 @@ class RelativeModel(ABC):
     def dynamics(self, time: float, state: Array = ON_THE_CHIEF) -> Array:
         """(6, 6) continuous matrix A(t): the Jacobian of `derivative` with respect to the state, there."""
 
+    def time_at(self, chief: Array, time: float) -> float:
+        """Time in the model (s), up to whole periods, at which its chief is where an inertial state (6,) is.
+
+        Perturbations change the period and turn the perigee: whatever repeats with the chief's revolution is in
+        phase with the estimated chief at this time, not at that of the clock, which holds for a model without a
+        phase and for a state that is on no orbit.
+        """
+        return time
+
     def motion(self, time: float, state: Array, acceleration: Array = NO_THRUST) -> tuple[Array, Array]:
         """`derivative` (6,) and `dynamics` (6, 6) at one state."""
         return self.derivative(time, state, acceleration), self.dynamics(time, state)
@@ -156,6 +165,14 @@ class LinearModel(RelativeModel):
     def transitions(self, time: float, durations: Array) -> Array:
         """(N, 6, 6) state transition matrices from one time over durations (N,), s."""
         return np.array([self.transition(time, float(duration)) for duration in durations])
+
+    def anchored(self, chief: Array, time: float) -> Self:
+        """The model about the orbit that an inertial state (6,) of the chief is on at a time (s)."""
+        return self
+
+    def continued(self, state: Array, other: Self) -> Array:
+        """(6,) state at time zero, in this model, of the motion that has a state (6,) there in another anchoring."""
+        return state
 
     def phase_rates(self, time: float) -> tuple[float, float]:
         """Rates (rad/s) of the in-plane and the cross-track oscillation at a time."""

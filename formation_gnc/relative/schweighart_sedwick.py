@@ -9,6 +9,7 @@ import numpy as np
 from formation_gnc.errors import OrbitError
 from formation_gnc.orbit.constants import EARTH_RADIUS, J2, MU
 from formation_gnc.orbit.elements import Elements
+from formation_gnc.relative.chief import latitude_of
 from formation_gnc.relative.hill import HarmonicModel
 from formation_gnc.relative.model import ON_THE_CHIEF, Array, LinearModel
 
@@ -75,6 +76,11 @@ class CircularReference:
     def latitude_at(self, time: float) -> float:
         """Argument of latitude k t at a time, rad: Roberts (31)."""
         return self.latitude + self.nodal_rate * time
+
+    def time_at(self, chief: Array, time: float) -> float:
+        """Time within a nodal period at which the latitude is that of an inertial state (6,); `time` if it has none."""
+        latitude = latitude_of(chief)
+        return time if latitude is None else (latitude - self.latitude) % math.tau / self.nodal_rate
 
 
 @dataclass(frozen=True)
@@ -155,6 +161,10 @@ class SchweighartSedwickNodalModel(LinearModel):
     def longest_step(self) -> float:
         """A hundredth of the nodal period, s."""
         return 0.01 * self.period
+
+    def time_at(self, chief: Array, time: float) -> float:
+        """Time at which the argument of latitude is that of an inertial state (6,)."""
+        return self.reference.time_at(chief, time)
 
     @property
     def in_plane(self) -> SchweighartSedwickModel:

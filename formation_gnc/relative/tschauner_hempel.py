@@ -1,7 +1,7 @@
 """The Tschauner-Hempel equations, solved by Yamanaka and Ankersen's transition matrix."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -40,6 +40,23 @@ class TschaunerHempelModel(LinearModel):
     def longest_step(self) -> float:
         """Longest integration step, s, set by the chief's motion at its perigee."""
         return self.chief.longest_step
+
+    def time_at(self, chief: Array, time: float) -> float:
+        """Time at which the true anomaly is that of an inertial state (6,)."""
+        own = self.chief.time_at(chief)
+        return time if own is None else own
+
+    def anchored(self, chief: Array, time: float) -> Self:
+        """About the mean ellipse of an inertial state (6,) at a time (s); the same if that is near-circular."""
+        ellipse = self.chief.seen(chief, time)
+        return self if ellipse is None else replace(self, chief=ellipse)
+
+    def continued(self, state: Array, other: Self) -> Array:
+        """(6,) state at time zero with the constants, by the true anomaly, of a state (6,) about another ellipse."""
+        here, there = _Instant(self.chief, 0.0), _Instant(other.chief, 0.0)
+        constants = there.constants() @ (there.to_anomaly() @ state)
+        result: Array = here.to_time() @ (here.solutions(0.0) @ constants)
+        return result
 
     def phase_rates(self, time: float) -> tuple[float, float]:
         """Rate of the chief's true anomaly for both, rad/s."""

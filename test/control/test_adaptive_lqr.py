@@ -220,3 +220,11 @@ def test_any_input_gives_a_finite_force_within_the_limit(states, inertia, reach,
         assert np.isfinite(thrust.force).all()
         assert (np.abs(thrust.force) <= 0.01).all()
         assert np.isfinite(status.demand).all()
+
+
+def test_a_chief_that_is_too_eccentric_is_rejected(vehicle):
+    """The networks follow a deviation from circular motion, not another motion."""
+    law, parameters = AdaptiveLinearQuadraticRegulator, AdaptiveLqrParameters()
+    law(parameters, CommonParameters(Orbit(1e7, eccentricity=0.2), tick=10.0), vehicle)
+    with pytest.raises(DesignError, match=r"eccentricity is 0.4; it must be at most 0.2; lqr with .* tschauner_hempel"):
+        law(parameters, CommonParameters(Orbit(1.2e7, eccentricity=0.4), tick=10.0), vehicle)

@@ -10,9 +10,12 @@ from hypothesis.extra import numpy as hnp
 
 from formation_gnc.control.controller_manager import ControllerManager, ControllerParameters
 from formation_gnc.control.registry import ALGORITHMS, FINITE_HORIZONS
+from formation_gnc.control.weights import QuadraticWeights
+from formation_gnc.errors import ConfigurationError
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.parameters import load
 from formation_gnc.records import EventKind
+from formation_gnc.relative.hill import HillModel
 from formation_gnc.types import NANOSECONDS
 
 CHIEF = state_from_elements(Elements(6978100.0, 0.0, 1.48, 0.0, 0.0, 0.0))
@@ -123,3 +126,30 @@ def test_an_invalid_mass_gives_no_thrust_and_the_law_recovers(algorithm, mass, e
 def test_a_thrust_limit_of_zero_is_rejected(algorithm):
     with pytest.raises(ValueError, match=r"thrust_limit: .* is not allowed; one axis must push"):
         manager_of(algorithm, thrust_limit=(0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("axis", "xyz")
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_an_axis_without_thruster_is_designed_without_or_refused(algorithm, axis, estimate, target):
+    """Along-track thrust alone controls the in-plane motion, radial thrust alone does not."""
+    limit = tuple(0.0 if each == axis else 0.01 for each in "xyz")
+    weights = {}
+    if issubclass(ALGORITHMS[algorithm].Parameters, QuadraticWeights):
+        weights = {"position_error": (10.0,) * 3, "velocity_error": (0.1,) * 3, "thrust": (0.002,) * 3}
+    own = {f"{algorithm}.{key}": value for key, value in weights.items()}
+    if algorithm in FINITE_HORIZONS:
+        own |= {f"{algorithm}.final_time": 5000.0, f"{algorithm}.step": 50.0, f"{algorithm}.replan_interval": 1000.0}
+    values = {"chief.semi_major_axis": 6978100.0, "tick": 20.0, "thrust_limit": limit, "algorithm": algorithm} | own
+    if algorithm != "coast" and (axis == "y" or (axis == "x" and algorithm == "hinf")):
+        with pytest.raises(ConfigurationError, match=r"thrust_limit .* must be above 0"):
+            ControllerManager("controller", load(ControllerParameters, values))
+        return
+    manager = ControllerManager("controller", load(ControllerParameters, values))
+    model = HillModel(manager.parameters.mean_motion)
+    state = np.array([5.0, -8.0, 2.0, 0.0, 0.0, 0.0])
+    for tick in range(900):
+        thrust, _ = manager.on_tick(estimate(state, 20.0 * tick, chief=CHIEF), target(time=20.0 * tick))
+        state = model.propagate(0.0, state, 20.0, thrust.force / 100.0)
+    if algorithm != "coast":
+        assert np.linalg.norm(state[:2]) < 1.0
+        assert axis == "z" or abs(state[2]) < 0.1

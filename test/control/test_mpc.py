@@ -145,6 +145,22 @@ def test_thrust_stops_and_resumes_on_the_ticks_of_a_new_eclipse(common, vehicle,
     assert [bool(force.any()) for force in forces] == [True] * 30 + [False] * 30 + [True] * 20
 
 
+def test_the_thrust_is_down_when_an_eclipse_begins(common, vehicle, estimate, target):
+    """The limit on the rate is planned ahead of the eclipse: neither contradicts the other."""
+    rate, window = 5e-6, np.array([[1203.0, 3300.0]])
+    law = make(common, vehicle, off_in_eclipse=True, horizon=50, thrust_rate=rate)
+    _, forces, commands = simulate(
+        law, HillModel(common.mean_motion), estimate, target, [60, 60, 60, 0, 0, 0], 140, eclipses=window
+    )
+    assert not any(command.fallback for command in commands)
+    assert np.abs(forces[110:115]).max() > 1e-5
+    assert not forces[120:].any()  # the eclipse begins within the tick from 1200 s
+    # What the solver's accuracy leaves, a hundredth of the limit, is cut at the eclipse.
+    steps = np.abs(np.diff(np.vstack([np.zeros(3), forces]), axis=0)).max(axis=1)
+    assert np.delete(steps, 120).max() <= 10.0 * rate * (1.0 + 1e-3)
+    assert steps[120] <= 10.0 * rate + 1e-4
+
+
 def test_the_longest_eclipse_agrees_with_known_orbits():
     # Geostationary orbit: 69.4 min in the cylindrical shadow.
     assert longest_eclipse(Orbit(42164e3)) / 60.0 == pytest.approx(69.4, abs=0.2)
@@ -315,6 +331,10 @@ def test_equal_inputs_give_equal_bits(common, vehicle, estimate, target):
     ("changes", "message"),
     [
         ({"step": 15.0}, "step is 15.0 s; it must be a whole number of ticks of 10.0 s"),
+        (
+            {"off_in_eclipse": True, "horizon": 50, "thrust_rate": 1e-5, "replan_interval": 600.0},
+            "off_in_eclipse and thrust_rate contradict each other in a plan that is kept for 600 s",
+        ),
         ({"control_horizon": 31}, "control_horizon is 31 steps; it must be at most horizon, 30"),
         ({"off_in_eclipse": True}, "the horizon with thrust, 1800 s, is not longer than the eclipse, 21"),
         (

@@ -182,7 +182,9 @@ def test_a_sequence_that_does_not_converge_is_reported(common, vehicle, estimate
 def test_only_the_radial_axis_is_dispensable(law, common, estimate, target):
     """Every state is reachable without radial thrust, but not without along-track or cross-track thrust."""
     chief = state_from_elements(Elements(**vars(common.chief)))
-    for idle, words in ((0, ""), (1, "no plan"), (2, "no plan")):
+    with pytest.raises(DesignError, match="along the track"):
+        law(law.Parameters(**WEIGHTS), common, Vehicle(100.0, np.array([0.05, 0.0, 0.05])))
+    for idle, words in ((0, ""), (2, "no plan")):
         limit = np.full(3, 0.05)
         limit[idle] = 0.0
         controller = law(law.Parameters(**WEIGHTS), common, Vehicle(100.0, limit))

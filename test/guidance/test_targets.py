@@ -116,3 +116,32 @@ def test_error_of_a_linear_model_grows_with_the_square_of_the_size(size: float, 
     half, _ = path("hill", "projected_circular_orbit", about, size=size / 2.0).error()
     assert error == pytest.approx(4.0 * half, rel=0.05)
     assert (error > 0.05 * extent) == is_large
+
+
+@pytest.mark.parametrize("days", [0, 30])
+@pytest.mark.parametrize("eccentricity", [0.4, 0.7])
+def test_an_anchored_path_stays_free_motion_under_j2(eccentricity: float, days: int) -> None:
+    """Over a revolution; a path by the clock has lost the phase after a month."""
+    about = common(eccentricity)
+    chief, later = state_from_elements(about.chief_elements), 86400.0 * days
+    for _ in range(24 * days):
+        chief = propagate_with_transition(chief, np.zeros(3), 3600.0, 120)[0]
+    target = path("yamanaka_ankersen", "projected_circular_orbit", about, size=500.0)
+    missed = {}
+    for name, own in (("clock", target), ("anchored", target.anchored(chief, later))):
+        leader, deputy = chief, inertial_from_relative(chief, own.states(np.array([later]))[0])
+        period, misses = math.tau / about.mean_motion, []
+        for index in range(1, 25):
+            leader, deputy = (
+                propagate_with_transition(each, np.zeros(3), period / 24.0, 40)[0] for each in (leader, deputy)
+            )
+            time = later + index * period / 24.0
+            aim = own if name == "clock" else own.anchored(leader, time)
+            misses.append(relative_from_inertial(leader, deputy)[:3] - aim.states(np.array([time]))[0, :3])
+        missed[name] = np.linalg.norm(misses, axis=1).max()
+    # At the start, near the perigee, both miss what J2 does to a path without drift under point-mass gravity.
+    if days:
+        assert missed["anchored"] < 0.02 * 500.0
+        assert missed["clock"] > 2.0 * 500.0
+    else:
+        assert missed["anchored"] < 1.2 * missed["clock"]

@@ -12,7 +12,9 @@ import numpy as np
 from formation_gnc.common import CommonParameters
 from formation_gnc.common import Orbit as Chief
 from formation_gnc.control.controller import Command, Controller, Vehicle
+from formation_gnc.control.finite_horizon import FiniteHorizonController
 from formation_gnc.control.models import PLAN_MODELS
+from formation_gnc.control.plan import held_over_tick
 from formation_gnc.control.registry import ALGORITHMS, FINITE_HORIZONS
 from formation_gnc.guidance.relative_orbit import RelativeOrbit, RelativeOrbitParameters
 from formation_gnc.orbit.constants import MU
@@ -111,11 +113,16 @@ def fly_law(
     chief, commands = chief_of(eccentricity), list[Command]()
 
     def thrust(time: float, state: Array) -> Array:
-        command = law.command(estimate(time, state, inertial(chief, oblate, time), MASS), aim(time))
+        leader = inertial(chief, oblate, time)
+        command = law.command(estimate(time, state, leader, MASS), aim(time))
         if command.fallback:
             raise RuntimeError(f"{type(law).__name__}: {command.fallback}")
         commands.append(command)
-        return np.asarray(command.force / MASS)
+        if not isinstance(law, FiniteHorizonController):
+            return np.asarray(command.force / MASS)
+        # Planners command what is held inertially; here it turns with the Hill frame, as in the plan.
+        turned = np.transpose([held_over_tick(axis, leader, TICK) for axis in np.eye(3)])
+        return np.asarray(np.linalg.solve(turned, command.force / MASS))
 
     plant: Any = PLAN_MODELS[model_of(oblate)](chief)
     states, accelerations = fly(plant, START, thrust, round(duration / TICK), TICK)
