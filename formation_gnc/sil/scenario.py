@@ -3,7 +3,7 @@
 import math
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -104,6 +104,11 @@ def given_to(path: Path, node: str) -> dict[str, Any]:
     return _given(_sections(path), node)
 
 
+def sections_given_to(path: Path, names: Collection[str]) -> list[tuple[str, Mapping[str, Any]]]:
+    """Sections of a parameter file for a node that has these names: pattern of nodes, and values by dotted name."""
+    return [(pattern, section) for pattern, section in _sections(path) if any(matches(pattern, name) for name in names)]
+
+
 def _directories() -> Iterator[Path]:
     source = Path(formation_gnc.__file__).resolve().parents[1]
     if (source / "package.xml").is_file():
@@ -123,12 +128,12 @@ def _load(schema: Any, sections: list[tuple[str, Mapping[str, Any]]], node: str)
 def _given(sections: list[tuple[str, Mapping[str, Any]]], node: str) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for pattern, section in sections:
-        if _matches(pattern, node):
+        if matches(pattern, node):
             values |= section
     return values
 
 
-def _matches(pattern: str, node: str) -> bool:
+def matches(pattern: str, node: str) -> bool:
     """Whether a parameter file's node name, with ``*`` for one token and ``**`` for any, means this node."""
     expression = "".join(
         {"**": "(/[^/]+)*", "*": "/[^/]+"}.get(token, "/" + re.escape(token)) for token in pattern.strip("/").split("/")

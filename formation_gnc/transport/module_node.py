@@ -1,21 +1,18 @@
 """The node of a flight module, whichever: its place in the graph is read from the graph table."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from time import perf_counter
 from typing import Any
 
-from rcl_interfaces.msg import SetParametersResult
-from rclpy.parameter import Parameter
 from rclpy.service import Service
 from rclpy.timer import Timer
 
-from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import ModuleInstance, Row
-from formation_gnc.parameters import OWN_OF_ROS
-from formation_gnc.records import Event, Timing
+from formation_gnc.parameters import dump
+from formation_gnc.records import Event, EventKind, Timing
 from formation_gnc.transport.bus import IntraProcessBus
 from formation_gnc.transport.conversion import codec
 from formation_gnc.transport.node import ConfiguredNode
@@ -43,7 +40,7 @@ class ModuleNode(ConfiguredNode):
         """
         super().__init__(row.name, row.parameters, namespace="deputy1")
         self._bus = bus or IntraProcessBus()
-        self._instance = ModuleInstance(row, self.get_namespace().strip("/"), self.values)
+        self._instance = ModuleInstance(row, self.get_namespace().rpartition("/")[2], self.values)
         self._module = self._instance.module
         self._publish = {
             topic.of(self._instance.deputy): self._published(topic) for topic in self._instance.published()
@@ -55,7 +52,6 @@ class ModuleNode(ConfiguredNode):
         for topic, record in {**self._instance.inputs, **self._instance.inputs_of_others}.items():
             self._subscribe_input(topic, record)
         self._designer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="design")
-        self.add_on_set_parameters_callback(self._on_set_parameters)
         for service in self.services:
             if service.srv_name.endswith(("/set_parameters", "/set_parameters_atomically")):
                 _answer_from(self._designer, service)
@@ -102,18 +98,19 @@ class ModuleNode(ConfiguredNode):
         spent = perf_counter() - started
         self._bus.deliver()
         self._publish_timing(Timing(inputs[0].time, self._instance.row.name, round(spent * NANOSECONDS)))
+        self._publish_events()
+
+    def _publish_events(self) -> None:
         for event in self._instance.take_events():
             self.log_event(event)
             self._publish_event(event)
+            if event.kind in (EventKind.PARAMETERS, EventKind.REJECTED):
+                self.show_parameters(dump(self._module.parameters))
 
-    def _on_set_parameters(self, parameters: Sequence[Parameter]) -> SetParametersResult:
-        changes = {each.name: each.value for each in parameters if not each.name.startswith(OWN_OF_ROS)}
-        if changes:
-            try:
-                self._module.commit(self._module.stage(changes))
-            except ConfigurationError as rejection:
-                return SetParametersResult(successful=False, reason=str(rejection))
-        return SetParametersResult(successful=True)
+    def stage_parameters(self, changes: Mapping[str, Any]) -> tuple[Any, Callable[[], None]]:
+        """Design for a change; it takes effect at the next tick."""
+        staged = self._module.stage(changes)
+        return staged.parameters, lambda: self._module.commit(staged)
 
     def destroy_node(self) -> None:
         """Let no design outlive the node."""
