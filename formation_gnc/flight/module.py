@@ -101,6 +101,11 @@ class FlightModule[P: ModuleParameters, D](ABC):
         """Raise ConfigurationError for scheduled changes that may not follow one another, or `start`."""
 
     @property
+    def waiting_for(self) -> str:
+        """What it lacks to answer, in words; empty for nothing."""
+        return ""
+
+    @property
     def parameters(self) -> P:
         """The parameters in force."""
         return self.configuration.parameters

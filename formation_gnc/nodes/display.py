@@ -19,6 +19,7 @@ from formation_gnc.transport.node import ConfiguredNode
 from formation_gnc.transport.process import run
 from formation_gnc.transport.qos import LATEST, quality
 from formation_gnc.transport.raw_topics import first_stamp
+from formation_gnc.transport.subscriptions import Information
 from formation_gnc.types import NANOSECONDS, Vector
 
 
@@ -32,7 +33,9 @@ class DisplayNode(ConfiguredNode):
     def __init__(self) -> None:
         """Subscribe to the truth, and to the targets of the deputies in it."""
         super().__init__("display", DisplayParameters)
-        self._marker_publisher = self.create_publisher(MarkerArray, topics.MARKERS.name, quality(LATEST))
+        self._marker_publisher = self.create_publisher(
+            MarkerArray, self.full_name(topics.MARKERS.name), quality(LATEST)
+        )
         self._publish_transforms = self._transform_publisher()
         self._truth: bytes | None = None
         self._targets: dict[str, bytes] = {}
@@ -45,12 +48,12 @@ class DisplayNode(ConfiguredNode):
         try:
             from tf2_msgs.msg import TFMessage
         except ImportError:
-            single = self.create_publisher(TransformStamped, topics.TRANSFORMS.name, quality())
+            single = self.create_publisher(TransformStamped, self.full_name(topics.TRANSFORMS.name), quality())
             return lambda transforms: [single.publish(each) for each in transforms]
-        together = self.create_publisher(TFMessage, topics.TF.name, quality(LATEST))
+        together = self.create_publisher(TFMessage, self.full_name(topics.TF.name), quality(LATEST))
         return lambda transforms: together.publish(TFMessage(transforms=transforms))
 
-    def _on_truth(self, data: bytes) -> None:
+    def _on_truth(self, data: bytes, _: Information) -> None:
         """Keep the latest as bytes, and decode it only for the points of the trails."""
         self._truth = data
         time = first_stamp(data)
@@ -63,6 +66,9 @@ class DisplayNode(ConfiguredNode):
                 trail = self._trails.setdefault(deputy.name, deque(maxlen=points))
                 trail.append(deputy.relative_state[:3])
 
+    def _on_target(self, deputy: str, data: bytes, _: Information) -> None:
+        self._targets[deputy] = data
+
     def _draw(self) -> None:
         """Publish the latest, if there is any."""
         if self._truth is None:
@@ -71,8 +77,7 @@ class DisplayNode(ConfiguredNode):
         for deputy in truth.deputies:
             if deputy.name not in self._targets:
                 self._targets[deputy.name] = b""
-                keep = partial(self._targets.__setitem__, deputy.name)
-                self.subscribe(Target, topics.TARGET.of(deputy.name), keep)
+                self.subscribe(Target, topics.TARGET.of(deputy.name), partial(self._on_target, deputy.name))
         targets = {name: from_cdr(Target, data) for name, data in self._targets.items() if data}
         size = self.values.size or max(
             1.0, max(float(np.linalg.norm(each.relative_state[:3])) for each in truth.deputies) / 40.0

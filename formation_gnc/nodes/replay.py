@@ -15,6 +15,7 @@ from formation_gnc.transport.node import ConfiguredNode
 from formation_gnc.transport.process import run, stop_requested
 from formation_gnc.transport.qos import quality
 from formation_gnc.transport.raw_topics import first_stamp
+from formation_gnc.transport.subscriptions import Information
 from formation_gnc.types import NANOSECONDS
 
 BURST = 50
@@ -45,7 +46,7 @@ class ReplayNode(ConfiguredNode):
         except ConfigurationError as error:
             raise ConfigurationError(f"topic {topic}: {error}") from None
         bag.check_type(topic)
-        return self.create_publisher(kind, topic, quality())
+        return self.create_publisher(kind, self.full_name(topic), quality())
 
     def _play(self, tick: PlayedTick) -> None:
         for topic, data in tick.messages:
@@ -53,7 +54,7 @@ class ReplayNode(ConfiguredNode):
         self._publish_clock(Clock(tick.stamp))
 
     def _is_published(self, topic: str) -> bool:
-        return bool(self.count_publishers(topic))
+        return bool(self.count_publishers(self.full_name(topic)))
 
     def check(self) -> bool:
         """Play what is due, and say whether that was all."""
@@ -66,7 +67,7 @@ class ReplayNode(ConfiguredNode):
                 break
         return self.player.done
 
-    def _on_answer(self, topic: str, data: bytes) -> None:
+    def _on_answer(self, topic: str, data: bytes, _: Information) -> None:
         self.player.answer(topic, first_stamp(data))
         self.check()
 

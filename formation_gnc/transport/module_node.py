@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from time import perf_counter
+from time import perf_counter, time_ns
 from typing import Any
 
 from rclpy.service import Service
@@ -11,15 +11,20 @@ from rclpy.timer import Timer
 
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import ModuleInstance, Row
+from formation_gnc.flight.synchronizer import HISTORY
 from formation_gnc.parameters import dump
 from formation_gnc.records import Event, EventKind, Timing
 from formation_gnc.transport.bus import IntraProcessBus
 from formation_gnc.transport.conversion import codec
 from formation_gnc.transport.node import ConfiguredNode
+from formation_gnc.transport.subscriptions import Information
 from formation_gnc.types import NANOSECONDS
 
 SETTLING = 0.1
-"""Wall time (s) that a node which has just started collects, from the first message on, before it answers."""
+"""Wall time (s) for which a node that finds messages from before its start waits for more of them."""
+
+INPUT_DEPTH = HISTORY
+"""Messages of an input that may wait: those that come at once to a node which is still starting, or is busy."""
 
 
 class ModuleNode(ConfiguredNode):
@@ -29,8 +34,8 @@ class ModuleNode(ConfiguredNode):
     that no answer waits for it, and takes effect at the next tick; it is answered when that is settled, with
     the reason if it is rejected.
 
-    A node that comes late finds the topics' history, and answers its last tick only: an answer to an older one
-    would look like a new run to those who have gone on.
+    A node that comes late finds what was published before, and answers its last tick only: an answer to an older
+    one would look like a new run to those who have gone on. What is published from its start on it takes all.
     """
 
     def __init__(self, row: Row, bus: IntraProcessBus | None = None) -> None:
@@ -47,7 +52,10 @@ class ModuleNode(ConfiguredNode):
         }
         self._publish_event = self.publisher_of(Event, topics.EVENTS.name)
         self._publish_timing = self.publisher_of(Timing, topics.TIMING.name)
-        self._latest: dict[str, Callable[[], None]] = {}
+        self._started = time_ns()
+        self._latest: dict[str, bytes] = {}
+        self._settling: Timer | None = None
+        self._decoders: dict[str, Callable[[bytes], Any]] = {}
         self._settled = next(iter(self._instance.inputs)) in self._bus
         for topic, record in {**self._instance.inputs, **self._instance.inputs_of_others}.items():
             self._subscribe_input(topic, record)
@@ -71,21 +79,30 @@ class ModuleNode(ConfiguredNode):
         if topic in self._bus:
             self._bus.subscribe(topic, partial(self._take, topic))
         else:
-            self.subscribe(record, topic, partial(self._receive, topic, codec(record).decode))
+            self._decoders[topic] = codec(record).decode
+            self.subscribe(record, topic, partial(self._receive, topic), INPUT_DEPTH)
 
-    def _receive(self, topic: str, decode: Callable[[bytes], Any], data: bytes) -> None:
-        if self._settled:
-            self._take(topic, decode(data))
-            return
+    def _receive(self, topic: str, data: bytes, about: Information) -> None:
+        if not self._settled:
+            if about["source_timestamp"] < self._started:
+                self._keep(topic, data)
+                return
+            self._settle()
+        self._take(topic, self._decoders[topic](data))
+
+    def _keep(self, topic: str, data: bytes) -> None:
+        """Keep the latest message from before the start."""
         if not self._latest:
-            timer = self.create_wall_timer(SETTLING, lambda: self._settle(timer))
-        self._latest[topic] = partial(self._take, topic, decode(data))
+            self._settling = self.create_wall_timer(SETTLING, self._settle)
+        self._latest[topic] = data
 
-    def _settle(self, timer: Timer) -> None:
-        timer.cancel()
+    def _settle(self) -> None:
+        """Answer the last tick from before the start."""
         self._settled = True
-        for take in self._latest.values():
-            take()
+        if self._settling is not None:
+            self._settling.cancel()
+        for topic, data in self._latest.items():
+            self._take(topic, self._decoders[topic](data))
 
     def _take(self, topic: str, record: Any) -> None:
         """Answer the tick when the last input of its stamp is there; the outputs go first, others wait for them."""

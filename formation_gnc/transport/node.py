@@ -29,6 +29,7 @@ from formation_gnc.transport.conversion import codec, message_type
 from formation_gnc.transport.parameter_arguments import given_parameters, without_parameters
 from formation_gnc.transport.process import stop_requested
 from formation_gnc.transport.qos import LATEST, quality
+from formation_gnc.transport.subscriptions import Information, subscribe_to_all
 
 Executor: Any = EventsExecutor
 
@@ -150,14 +151,19 @@ class ConfiguredNode(Node):  # type: ignore[misc]
         encode: Callable[[Any], bytes] = codec(record).encode
         return lambda each: publisher.publish(encode(each))
 
-    def subscribe(self, record: type, topic: str, callback: Callable[[bytes], object]) -> None:
-        """Call back with the latest message of a record on a topic, as CDR bytes."""
-        self.create_subscription(message_type(record), self.full_name(topic), callback, quality(LATEST), raw=True)
+    def subscribe(
+        self, record: type, topic: str, callback: Callable[[bytes, Information], object], depth: int = LATEST
+    ) -> None:
+        """Call back with a topic's messages of a record, as CDR bytes and what is known of each.
+
+        depth: messages kept between two callbacks, the latest.
+        """
+        subscribe_to_all(self, message_type(record), self.full_name(topic), callback, depth)
 
     def subscribe_decoded(self, record: type, topic: str, callback: Callable[[Any], object]) -> None:
-        """As `subscribe`, with the record."""
+        """As `subscribe`, with the record of the latest message."""
         decode: Callable[[bytes], Any] = codec(record).decode
-        self.subscribe(record, topic, lambda data: callback(decode(data)))
+        self.subscribe(record, topic, lambda data, _: callback(decode(data)))
 
     def log_event(self, event: Event) -> None:
         """Log an event at the level of its kind; rclpy allows one level per line of code."""

@@ -2,7 +2,6 @@
 
 import struct
 from collections.abc import Callable
-from functools import wraps
 from typing import Any
 
 from rclpy.node import Node
@@ -12,6 +11,7 @@ from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
 from formation_gnc.transport.conversion import message_class
 from formation_gnc.transport.qos import quality
+from formation_gnc.transport.subscriptions import with_information
 from formation_gnc.types import NANOSECONDS
 
 Callback = Callable[[bytes, int, int | None], None]
@@ -65,18 +65,7 @@ class RawTopics:
                 self._time = stamp
             take(data, stamp, about["publication_sequence_number"])
 
-        self._node.create_subscription(kind, topic, _as_executor_calls(receive), qos, raw=True)
-
-
-def _as_executor_calls(receive: Callable[[bytes, dict[str, Any]], None]) -> Callable[..., None]:
-    """Take a message and what is known about it as two arguments or, from the EventsExecutor, as one pair."""
-
-    @wraps(receive)  # rclpy looks at the signature to see whether it is wanted
-    def call(*given: Any) -> None:
-        data, about = given if len(given) == 2 else given[0]
-        receive(data, about)
-
-    return call
+        self._node.create_subscription(kind, topic, with_information(receive), qos, raw=True)
 
 
 def first_stamp(data: bytes) -> int:
