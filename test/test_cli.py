@@ -220,7 +220,8 @@ def test_the_summary_names_the_figures_the_bag_and_the_picture(desk: Path, capsy
         "final position error",
         "RMS position error",
         "RMS estimation error",
-        "mean NIS",
+        "NIS over expected",
+        "formation held",
         "delta-v",
     ):
         assert words in printed
@@ -283,7 +284,7 @@ def test_help_of_a_command_describes_all_its_options(name: str, capsys: pytest.C
     command.add_arguments(parser)
     for action in parser._actions:
         assert action.help, f"{action.dest} has no help"
-        assert max(action.option_strings or [action.dest], key=len) in printed
+        assert max(action.option_strings or [str(action.metavar or action.dest)], key=len) in printed
 
 
 @pytest.mark.thorough

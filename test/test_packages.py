@@ -193,6 +193,21 @@ def test_a_machine_without_is_told_in_one_line_what_to_install(lacking, advice, 
     assert not (tmp_path / ".venv").exists()
 
 
+def test_all_that_a_machine_lacks_is_told_at_once(tmp_path):
+    shutil.copytree(ROOT / "tools", tmp_path / "tools")
+    (tmp_path / ".ros").write_text(f"wheels for {tmp_path}\n")
+    nothing = {
+        "PATH": without(tmp_path, "c++", "python3.12"),
+        "PYENV_ROOT": str(tmp_path),
+        "XDG_DATA_HOME": str(tmp_path),
+    }
+    result = run("tools/make_venv.sh", cwd=tmp_path, **nothing)
+    assert result.returncode == 2
+    assert result.stderr.count("\n") == 1
+    for advice in ("install g++", "install python3.12", "uv python install 3.12"):
+        assert advice in result.stderr
+
+
 def test_the_lock_pins_every_package_with_its_hashes():
     for name in ("requirements.lock", "requirements-verify.lock"):
         entries = re.split(r"\n(?=[a-z0-9])", (ROOT / name).read_text().split("\n", 2)[2])

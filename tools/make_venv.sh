@@ -5,10 +5,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 read -r ros _ < .ros  # the prefix of the ROS 2 in use, or "wheels"
 
-fail() {
-    echo "formation_gnc: $*" >&2
-    exit 2
-}
+missing=()  # all that has to be installed, told at once
 
 # Runs on any Python 3 and says "right <path>", or what is missing, or nothing for another version.
 appraise='
@@ -24,33 +21,36 @@ if sys.version_info[:2] == (3, 12):
         print("right", sys._base_executable)
 '
 
-find_python() { # of these candidates; [rclpy, if it must have that]
-    local candidate verdict path missing=""
+find_python() { # of these candidates, into $python; [rclpy, if it must have that]
+    local candidate verdict path lacking=""
     for candidate in "${candidates[@]}"; do
         # A pyenv shim stands on PATH for inactive versions too, and fails.
         read -r verdict path < <("$candidate" -c "$appraise" "$@" 2> /dev/null) || continue
         if [[ $verdict == right ]]; then
-            echo "$path"
+            python=$path
             return
         fi
-        missing=${missing:-$verdict}
+        lacking=${lacking:-$verdict}
     done
-    case $missing in
-        headers) fail "Python 3.12 lacks its headers: install python3.12-dev." ;;
-        venv) fail "Python 3.12 lacks venv: install python3.12-venv." ;;
-        rclpy) fail "the ROS 2 Jazzy in $ros lacks rclpy: install ros-jazzy-rclpy." ;;
-        *) fail "no Python 3.12: install python3.12, python3.12-dev and python3.12-venv, or run 'uv python install 3.12'." ;;
+    case $lacking in
+        headers) missing+=("Python 3.12 lacks its headers: install python3.12-dev") ;;
+        venv) missing+=("Python 3.12 lacks venv: install python3.12-venv") ;;
+        rclpy) missing+=("the ROS 2 Jazzy in $ros lacks rclpy: install ros-jazzy-rclpy") ;;
+        *) missing+=("no Python 3.12: install python3.12, python3.12-dev and python3.12-venv, or where there are none \
+(Debian 13, Ubuntu 22.04) run 'python3 -m venv ~/.uv && ~/.uv/bin/pip install uv && ~/.uv/bin/uv python install 3.12'") ;;
     esac
 }
 
-for compiler in "${CC:-cc}" "${CXX:-c++}"; do
-    command -v "$compiler" > /dev/null || fail "no C++ compiler ($compiler): install g++."
+compilers="${CC:-cc} ${CXX:-c++}"
+for compiler in $compilers; do
+    command -v "$compiler" > /dev/null || missing+=("no C++ compiler ($compiler): install g++")
 done
 
 if [[ $ros == wheels ]]; then
-    candidates=(python3.12 python3 "${PYENV_ROOT:-$HOME/.pyenv}"/versions/3.12*/bin/python3.12)
+    candidates=(python3.12 python3 "${PYENV_ROOT:-${HOME:-}/.pyenv}"/versions/3.12*/bin/python3.12)
+    candidates+=("${UV_PYTHON_INSTALL_DIR:-${XDG_DATA_HOME:-${HOME:-}/.local/share}/uv/python}"/cpython-3.12*/bin/python3.12)
     ! command -v uv > /dev/null || candidates+=("$(uv python find 3.12 2> /dev/null || true)")
-    python=$(find_python)
+    find_python
     options=()
     left_out='^$'
 else
@@ -60,9 +60,15 @@ else
         set -u
     fi
     candidates=(/usr/bin/python3 python3 python3.12)
-    python=$(find_python rclpy)
+    find_python rclpy
     options=(--system-site-packages)
     left_out='^(ros-|catkin-pkg=|empy=|lark-parser=)'  # an installed ROS brings its own
+fi
+
+if ((${#missing[@]})); then
+    printf -v all '%s; ' "${missing[@]}"
+    echo "formation_gnc: ${all%; }." >&2
+    exit 2
 fi
 
 if ! cmp --quiet .ros .venv/.ros; then

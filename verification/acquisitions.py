@@ -57,7 +57,7 @@ class Acquisition:
     out_of_reach: int
     """Places, of the fixed ones, to which no law comes in time."""
     over_least: float
-    """Delta-v of all four over the least, with places shared out, as it was when last looked at."""
+    """Delta-v of all four over the least, with slots assigned, as it was when last looked at."""
 
     @property
     def name(self) -> str:
@@ -87,7 +87,7 @@ class Setting:
     @property
     def name(self) -> str:
         """In words."""
-        return f"{self.weight:g}" + ", shared out" * self.shared + f", {self.truth} truth" * bool(self.truth)
+        return f"{self.weight:g}" + ", assigned" * self.shared + f", {self.truth} truth" * bool(self.truth)
 
 
 PRINTED, FIXED = Setting(1.7), Setting(17.0)
@@ -96,7 +96,7 @@ SETTINGS = (PRINTED, FIXED, SHARED, TWO_BODY, OBLATE)
 
 
 def scenario(acquisition: Acquisition, setting: Setting) -> Scenario:
-    """All that flies, from the places of the formation that is left.
+    """All that flies, from the slots of the formation that is left.
 
     Weights are those of the listing of netSATmpc, squared over scales of 4 m (along-track) and 2 m and their
     rates. A plan of an orbit, and a horizon of four thirds of one, both in whole steps.
@@ -126,15 +126,15 @@ def scenario(acquisition: Acquisition, setting: Setting) -> Scenario:
         guidance = common["/**/guidance"] | {"formation": formation, "assignment": assignment}
         return load_scenario(str(NETSAT), common | {"/plant": plant, "/**/guidance": guidance})
 
-    places: dict[str, Any] = {
+    starts: dict[str, Any] = {
         f"{name}.relative_state": Guidance(f"/{name}/guidance", setup["guidance"])
         .configuration.design.states(np.zeros(1))[0]
         .tolist()
         for name, setup in load(acquisition.left, {}, "fixed").deputies.items()
     }
     if setting.truth == "two-body":
-        places["forces.zonal_degree"] = 0
-    return load(acquisition.taken, places, "delta_v" if setting.shared else "fixed")
+        starts["forces.zonal_degree"] = 0
+    return load(acquisition.taken, starts, "delta_v" if setting.shared else "fixed")
 
 
 class HillTruth(Propagator):
@@ -314,7 +314,7 @@ DIFFERENCES = (
         "order and phase",
         "fixed; free in 3.4",
         "both",
-        "shared out: as guidance finds them for the least sum of delta-v",
+        "assigned: as guidance finds them for the least sum of delta-v",
     ),
 )
 
@@ -326,8 +326,8 @@ none where 8 uN are not enough.
 No thrust meets an eclipse that comes as foreseen; that steps are dark as a whole takes {lost:.0f} % of
 the orbit besides the night. The printed weight leaves hundreds of metres after 100 orbits, and with steps
 of 80 s, of which three times as many are to be paid for, it hardly moves at all. Ten times the weight
-brings all home whose places can be reached; that of the fourth satellite on the way to equidistant
-cannot, by any law. With order and phase shared out all arrive, and spend less. What MPC spends over the
+brings all home whose slots can be reached; that of the fourth satellite on the way to equidistant
+cannot, by any law. With order and phase assigned all arrive, and spend less. What MPC spends over the
 least it pays for being early, since the least takes all of the time, and for a cost that is quadratic in
 thrust.
 
@@ -396,7 +396,7 @@ def kremmydas(directory: Path) -> tuple[str, list[Figure]]:
         "",
         "![Errors](control_kremmydas.png)",
         "",
-        "Weight 17, shared out: the first three orbits; eclipses are shaded.",
+        "Weight 17, assigned: the first three orbits; eclipses are shaded.",
         "",
         "![Thrust](control_kremmydas_thrust.png)",
         "",
@@ -442,7 +442,7 @@ def guard(acquisition: Acquisition, flights: Mapping[Setting, Flight]) -> list[F
         # Tens to hundreds of metres: the weight pays for no more.
         Figure(f"{name}, 1.7: worst error", "not printed", flights[PRINTED].worst(100).max(), "m", 10.0, 1000.0),
         Figure(
-            f"{name}: places out of reach",
+            f"{name}: slots out of reach",
             "not printed",
             np.sum(~reachable),
             "",
@@ -457,9 +457,9 @@ def guard(acquisition: Acquisition, flights: Mapping[Setting, Flight]) -> list[F
             0.0,
             10.0,
         ),
-        Figure(f"{name}, shared out: worst error", "not printed", shared.worst(100).max(), "m", 0.0, 0.01),
+        Figure(f"{name}, assigned: worst error", "not printed", shared.worst(100).max(), "m", 0.0, 0.01),
         Figure(
-            f"{name}, shared out: delta-v over the least",
+            f"{name}, assigned: delta-v over the least",
             "not printed",
             over,
             "",

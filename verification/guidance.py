@@ -54,13 +54,13 @@ def times(common: CommonParameters) -> Array:
 
 
 def path(name: str, slot: int, model: str, common: CommonParameters) -> TargetPath:
-    """Target of a place of a formation with its default parameters."""
+    """Target of a slot of a formation with its default parameters."""
     formation = FORMATIONS[name]
     return TARGET_MODELS[model](formation(formation.Parameters(), common.mean_motion, slot), 0.0, common)
 
 
-def places(name: str) -> range:
-    """The places that are flown: all, or the first four of a formation without end."""
+def flown_slots(name: str) -> range:
+    """Slots that are flown: all, or the first four of a formation without end."""
     formation = FORMATIONS[name]
     return range(formation.slot_count(formation.Parameters()) or 4)
 
@@ -113,7 +113,7 @@ def drifts(directory: Path) -> tuple[str, list[Figure]]:
         ]
         for name in FORMATIONS:
             for model in MODELS:
-                carried = [path(name, slot, model, common) for slot in places(name)]
+                carried = [path(name, slot, model, common) for slot in flown_slots(name)]
                 targets = np.array([each.states(times(common)) for each in carried])
                 size = float(np.linalg.norm(targets[..., :3], axis=2).max())
                 off = {
@@ -151,7 +151,7 @@ def drifts(directory: Path) -> tuple[str, list[Figure]]:
 
 
 def assignments(directory: Path) -> tuple[str, list[Figure]]:
-    """Delta-v of fixed order, best places, and best places with the best phase."""
+    """Delta-v of fixed order, best slots, and best slots with the best phase."""
     rate = CIRCULAR.mean_motion
     duration = 2.0 * math.tau / rate
 
@@ -181,10 +181,10 @@ def assignments(directory: Path) -> tuple[str, list[Figure]]:
         "## Places and phase",
         "",
         "Predicted delta-v of four satellites to three-in-plane-one-out in two orbits, all together, m/s:",
-        "in the order they come, with the best places, and with the best phase too. From the tetrahedron,",
+        "in the order they come, with the best slots, and with the best phase too. From the tetrahedron,",
         f"and from {CASES} random sets of relative orbits without drift (500 m, one sigma).",
         "",
-        "| start | fixed order | best places | places and phase | saved by places | by both |",
+        "| start | fixed order | best slots | slots and phase | saved by slots | by both |",
         "|---|---|---|---|---|---|",
         f"| tetrahedron | {ours[0, 0]:.3f} | {ours[0, 1]:.3f} | {ours[0, 2]:.3f} | {saved[0, 0]:.1%} | "
         f"{saved[0, 1]:.1%} |",
@@ -197,12 +197,12 @@ def assignments(directory: Path) -> tuple[str, list[Figure]]:
     never = "never a loss"
     beyond = (saved[:, 1] - saved[:, 0]).min()
     figures = [
-        Figure("least saved by places", never, 100.0 * float(saved[:, 0].min()), "%", -1e-9, 100.0),
-        Figure("least saved by phase beyond places", never, 100.0 * float(beyond), "%", -1e-9, 100.0),
+        Figure("least saved by slots", never, 100.0 * float(saved[:, 0].min()), "%", -1e-9, 100.0),
+        Figure("least saved by phase beyond slots", never, 100.0 * float(beyond), "%", -1e-9, 100.0),
     ]
     lines += [TABLE, *(figure.row for figure in figures), "", "![Savings](guidance_assignment.png)", ""]
     plot, chart = plt.subplots(figsize=(8, 5))
-    chart.hist(100.0 * random, bins=20, label=["best places", "places and phase"])
+    chart.hist(100.0 * random, bins=20, label=["best slots", "slots and phase"])
     chart.set(xlabel="predicted delta-v saved against the fixed order, %", ylabel=f"cases of {CASES}")
     chart.legend()
     plot.tight_layout()

@@ -1,16 +1,16 @@
 """Recorded runs side by side: their figures, topics and curves."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
 from itertools import cycle
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from formation_gnc.analysis.matplotlib_renderer import draw
-from formation_gnc.analysis.metrics import deputies_of, figures, trajectory
+from formation_gnc.analysis.metrics import commanded_delta_v, deputies_of, figures, trajectory
 from formation_gnc.analysis.plot import COLOURS, TIME, Axis, Curve, Plot, Style
 from formation_gnc.analysis.thinning import POINTS
 from formation_gnc.flight import topics
@@ -28,6 +28,9 @@ AXES = (
 )
 """Quantities that are compared over time."""
 
+LINES: tuple[Literal["solid", "dashed", "dotted"], ...] = ("solid", "dashed", "dotted")
+"""Lines of runs that follow one another, so that equal curves are seen below one another."""
+
 
 def gnc_topics(*bags: Bag) -> list[str]:
     """Topics on which two equal runs have the same bits: the clock and the project's own but timing."""
@@ -39,55 +42,34 @@ def gnc_topics(*bags: Bag) -> list[str]:
     )
 
 
-def commanded_delta_v(bag: Bag, deputy: str) -> tuple[Vector, Vector]:
-    """Delta-v that the controller commanded, whether or not it was applied.
-
-    Returns:
-        (N,) time, s, and (N,) delta-v up to the end of that tick, all axes added, m/s.
-    """
-    topic = topics.THRUST.of(deputy)
-    if topic not in bag.topics or bag.topics[topic].count == 0:
-        return np.zeros(0), np.zeros(0)
-    thrust, truth = bag.arrays(topic, ("force",)), bag.arrays(topics.TRUTH.name, ("deputies",))
-    prefix = f"deputies.{deputies_of(bag).index(deputy)}."
-    mass = np.interp(thrust["time"], truth["time"], truth[f"{prefix}mass"])
-    tick = float(truth["time"][1] - truth["time"][0]) if len(truth["time"]) > 1 else 0.0
-    return thrust["time"], np.cumsum(np.abs(thrust["force"]).sum(axis=1) / mass) * tick
-
-
-def run_figures(bag: Bag) -> dict[str, dict[str, float]]:
+def run_figures(bag: Bag) -> dict[str, dict[str, float | str]]:
     """Figures of a run by name, for the run as a whole ("") and for each deputy.
 
     Raises:
         BagError: no truth, or a deputy without estimates or targets.
     """
     result = figures(bag)
-    table: dict[str, dict[str, float]] = {"": {"ticks": result.ticks, "misses": result.misses}}
-    for name, deputy in result.deputies.items():
-        values = asdict(deputy)
-        for axis, value in zip("xyz", values.pop("delta_v_axes_m_s"), strict=True):
-            values[f"delta_v_{axis}_m_s"] = value
-        _, delta_v = commanded_delta_v(bag, name)
-        values["commanded_delta_v_m_s"] = float(delta_v[-1]) if len(delta_v) else 0.0
-        table[name] = values
-    return table
+    table: dict[str, dict[str, float | str]] = {"": {"ticks": result.ticks, "misses": result.misses}}
+    return table | {name: deputy.by_name() for name, deputy in result.deputies.items()}
 
 
 def draw_comparison(bags: Sequence[Bag], labels: Sequence[str], path: Path) -> None:
     """Draw errors, applied and commanded delta-v over time: a row per deputy, a curve per bag."""
     names = list(dict.fromkeys(name for bag in bags for name in deputies_of(bag)))
-    figure = Figure(figsize=(19.0, 4.2 * len(names) + 0.4), layout="constrained", dpi=100)
+    figure = Figure(figsize=(13.0, 8.0 * len(names) + 0.4), layout="constrained", dpi=100)
     FigureCanvasAgg(figure)
-    grid = figure.add_gridspec(len(names), len(AXES))
+    grid = figure.add_gridspec(len(AXES) // 2 * len(names), 2)
     for row, name in enumerate(names):
         curves: list[list[Curve]] = [[] for _ in AXES]
-        for bag, label, colour in zip(bags, labels, cycle(COLOURS), strict=False):
+        looks = (Style(colour, line) for colour, line in zip(cycle(COLOURS), cycle(LINES)))
+        for bag, label, look in zip(bags, labels, looks, strict=False):
             if name in deputies_of(bag):
                 for of_axis, (time, values) in zip(curves, _series(bag, name), strict=True):
                     step = max(1, len(time) // POINTS)
-                    of_axis.append(Curve(label, time[::step] / 3600.0, values[::step], Style(colour, width=1.1)))
+                    of_axis.append(Curve(label, time[::step] / 3600.0, values[::step], look))
         for column, (axis, of_axis) in enumerate(zip(AXES, curves, strict=True)):
-            draw(figure, grid[row, column], Plot(name, TIME, axis, of_axis))
+            place = grid[len(AXES) // 2 * row + column // 2, column % 2]
+            draw(figure, place, Plot(f"{name}: {axis.label}", TIME, axis, of_axis))
     figure.savefig(path)
 
 

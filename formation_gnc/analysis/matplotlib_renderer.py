@@ -9,6 +9,11 @@ from formation_gnc.analysis.plot import Axis, Curve, Plot, Style
 _LINES = {"solid": "-", "dashed": "--", "dotted": ":", "none": ""}
 _MARKERS = {"none": "", "dot": "o", "star": "*", "diamond": "D"}
 
+LEGEND_Y = -0.16
+"""Top of a legend, in heights of the axes above their lower edge."""
+
+LEGEND_COLUMNS = 4
+
 
 def draw(figure: Figure, place: Any, plot: Plot) -> None:
     """Draw a plot at a place of a figure, a `SubplotSpec`."""
@@ -31,7 +36,9 @@ def draw(figure: Figure, place: Any, plot: Plot) -> None:
     if right and plot.right:
         _set_axis(right, "y", plot.right)
     if handles:
-        axes.legend(handles.values(), handles.keys(), loc="best", fontsize="small")
+        # Below the axes, where it covers no curve.
+        place = {"loc": "upper center", "bbox_to_anchor": (0.5, LEGEND_Y), "frameon": False, "fontsize": "small"}
+        axes.legend(handles.values(), handles.keys(), ncols=min(len(handles), LEGEND_COLUMNS), **place)
     axes.grid(alpha=0.3)
 
 

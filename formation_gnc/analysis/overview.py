@@ -14,7 +14,7 @@ from formation_gnc.analysis.run_history import RunHistory
 
 
 def draw_overview(run: RunHistory, path: Path, title: str) -> Path:
-    """Draw the overview panels of all deputies, for a fleet a row each, and below them those of the fleet.
+    """Draw the overview panels of the deputy; for a fleet those of all together, then a row for each deputy.
 
     Args:
         run: to draw.
@@ -27,14 +27,16 @@ def draw_overview(run: RunHistory, path: Path, title: str) -> Path:
     rows = [_overview_plots(deputy, DEPUTY_PANELS) for deputy in run.deputies.values()]
     if len(rows) == 1:  # a single deputy in two columns
         rows = [rows[0][start : start + 2] for start in range(0, len(rows[0]), 2)]
-    rows += [[plot] for plot in _overview_plots(run, FLEET_PANELS)]
+    else:
+        rows.insert(0, _overview_plots(run, FLEET_PANELS))
     columns = max(len(row) for row in rows)
     figure = _figure(5.5 * columns, 4.4 * len(rows) + 0.4, 100)
     figure.suptitle(title)
     grid = figure.add_gridspec(len(rows), columns)
     for number, row in enumerate(rows):
         for column, plot in enumerate(row):
-            draw(figure, grid[number, column if len(row) > 1 else slice(None)], plot)
+            cells = slice(column * columns // len(row), (column + 1) * columns // len(row))
+            draw(figure, grid[number, cells], plot)
     figure.savefig(path)
     return path
 

@@ -18,6 +18,7 @@ _LARGE_HEIGHT = 520  # px, of a plot that is not over time
 _LINES = {"solid": "solid", "dashed": "dash", "dotted": "dot"}
 _MARKERS = {"dot": "circle", "star": "star", "diamond": "diamond-open"}
 _PIXELS = 1.5  # per point
+_LEGEND = {"orientation": "h", "yanchor": "top", "xanchor": "left", "x": 0.0}  # below, so that plots have the width
 
 
 def draw_columns(columns: Sequence[Sequence[Plot]], timeline: Timeline) -> go.Figure:
@@ -42,8 +43,8 @@ def draw_columns(columns: Sequence[Sequence[Plot]], timeline: Timeline) -> go.Fi
     if over_time:
         _mark(figure, timeline, len(columns))
     height = sum(_ROW_HEIGHT if any(plot and plot.over_time for plot in row) else _LARGE_HEIGHT for row in rows)
-    figure.update_layout(height=height + 80, margin={"t": 30, "r": 20}, template="plotly_white")
-    figure.update_layout(legend={"groupclick": "togglegroup"})
+    figure.update_layout(height=height + 160, margin={"t": 30, "r": 20}, template="plotly_white")
+    figure.update_layout(legend={"groupclick": "togglegroup", **_LEGEND, "y": -60.0 / height})
     return figure
 
 
@@ -64,6 +65,7 @@ def draw_space(plot: Plot) -> go.Figure:
     }
     margin = {"t": 40, "b": 50, "l": 0, "r": 0}
     figure.update_layout(height=780, margin=margin, template="plotly_white", scene=scene)
+    figure.update_layout(legend={**_LEGEND, "yanchor": "bottom", "y": 1.0}, modebar={"orientation": "v"})
     return figure
 
 

@@ -7,6 +7,8 @@ from typing import Any
 
 import plotly.graph_objects as go
 
+from formation_gnc.analysis.figure_table import FIGURES
+from formation_gnc.analysis.metrics import figures, law_at_the_end
 from formation_gnc.analysis.panels.panel import Panel
 from formation_gnc.analysis.panels.registry import DEPUTY_PANELS, FLEET_PANELS
 from formation_gnc.analysis.plot import Plot
@@ -18,7 +20,8 @@ from formation_gnc.recording.reader import Bag
 
 _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; margin: 1.5rem auto; max-width: 1280px; padding: 0 1rem; }
-table { border-collapse: collapse; font-size: 13px } td, th { border: 1px solid #ddd; padding: 2px 8px }
+table { border-collapse: collapse; font-size: 13px; display: block; overflow-x: auto }
+td, th { border: 1px solid #ddd; padding: 2px 8px }
 th { text-align: left; background: #f5f5f5 } details { margin: .4rem 0 } summary { cursor: pointer }
 """
 
@@ -35,19 +38,21 @@ def write_report(bag: Bag, run: RunHistory, path: Path, title: str) -> Path:
     Returns:
         The path.
     """
-    figures = _figures(run, FLEET_PANELS, run.timeline)
+    charts = _figures(run, FLEET_PANELS, run.timeline)
     for name, deputy in run.deputies.items():
         own = _figures(deputy, DEPUTY_PANELS, run.timeline_of(name))
-        figures |= {f"{name}: {heading}": figure for heading, figure in own.items()}
-    sections = [f"<h2>Summary</h2>{_table(_summary(run, bag))}"]
-    sections += [_section(heading, figure, number == 0) for number, (heading, figure) in enumerate(figures.items())]
+        charts |= {f"{name}: {heading}": figure for heading, figure in own.items()}
+    sections = [f"<h2>Summary</h2>{_table(_summary(run, bag))}<h2>Figures</h2>{_figure_table(bag)}"]
+    sections += [_section(heading, figure, number == 0) for number, (heading, figure) in enumerate(charts.items())]
     sections += [_event_table(run), "<h2>Parameters and provenance</h2>"]
     sections += [
         f"<details><summary>{escape(name)}</summary>{_table(values)}</details>"
         for name, values in sorted(bag.metadata.items())
     ]
     page = (
-        f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
+        f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{escape(title)}</title>"
         f"<link rel='icon' href='data:,'><style>{_STYLE}</style></head><body><h1>{escape(title)}</h1>"
         f"{''.join(sections)}</body></html>"
     )
@@ -73,7 +78,6 @@ def _figures[H](history: H, panels: Sequence[Panel[H]], timeline: Timeline) -> d
 def _summary(run: RunHistory, bag: Bag) -> dict[str, Any]:
     ticks = bag.topics[topics.TRUTH.name].count
     rows: dict[str, Any] = {"simulated time": f"{ticks * run.tick:g} s", "ticks": ticks}
-    rows |= {f"delta-v of {name}": f"{1e3 * each.total_delta_v:.3f} mm/s" for name, each in run.deputies.items()}
     if run.nearest is not None:
         near = run.nearest
         rows["nearest approach"] = f"{near.distance:.1f} m, {' and '.join(near.pair)} at {near.time:g} s"
@@ -82,6 +86,20 @@ def _summary(run: RunHistory, bag: Bag) -> dict[str, Any]:
     if bag.damage:
         rows["damage"] = bag.damage
     return rows
+
+
+def _figure_table(bag: Bag) -> str:
+    """Figures of merit of the deputies, and the law that each flew at the end."""
+    deputies = figures(bag).deputies
+    values = {name: each.by_name() for name, each in deputies.items()}
+    head = "".join(f"<th>{escape(name)}</th>" for name in deputies)
+    rows = [("control law at the end", [law_at_the_end(bag, name) for name in deputies])]
+    rows += [(figure.label, [figure.text(values[name][figure.name]) for name in deputies]) for figure in FIGURES]
+    body = "".join(
+        f"<tr><th>{escape(label)}</th>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
+        for label, cells in rows
+    )
+    return f"<table><tr><th></th>{head}</tr>{body}</table>"
 
 
 def _event_table(run: RunHistory) -> str:
@@ -98,7 +116,7 @@ def _event_table(run: RunHistory) -> str:
 
 
 def _section(heading: str, figure: go.Figure, with_library: bool) -> str:
-    config = {"displaylogo": False}
+    config = {"displaylogo": False, "responsive": True}
     body = figure.to_html(full_html=False, include_plotlyjs=with_library, auto_play=False, config=config)
     return f"<h2>{escape(heading)}</h2>{body}"
 

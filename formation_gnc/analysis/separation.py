@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
-from formation_gnc.analysis.metrics import deputies_of
+from formation_gnc.analysis.metrics import deputies_of, has_messages
 from formation_gnc.flight import topics
 from formation_gnc.recording.decode import nanoseconds
 from formation_gnc.recording.reader import Bag
@@ -55,7 +55,7 @@ def predicted_approach(bag: Bag, kind: str) -> Separation | None:
     nearest: Separation | None = None
     for name in deputies_of(bag):
         topic = topics.SEPARATION.of(name)
-        if topic not in bag.topics or not bag.topics[topic].count:
+        if not has_messages(bag, topic):
             continue
         predicted = bag.arrays(topic)
         index = int(predicted[kind].argmin())

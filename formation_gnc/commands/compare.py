@@ -6,15 +6,19 @@ wall time do not count.
 
 import argparse
 import json
+import string
 from pathlib import Path
 
 from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
 from formation_gnc.analysis.compare import draw_comparison, gnc_topics, run_figures
+from formation_gnc.analysis.figure_table import FIGURES, RUN_FIGURES
+from formation_gnc.commands.tables import print_table
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.recording import Bag, Difference, identical
+
+RunFigures = dict[str, dict[str, float | str]]
+"""Figures by name, by deputy; of the run as a whole by ""."""
 
 IDENTICAL = "identical on every GNC topic"
 
@@ -47,9 +51,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _summary(
-    paths: list[Path], figures: list[dict[str, dict[str, float]]], differences: list[list[Difference]]
-) -> dict[str, object]:
+def _summary(paths: list[Path], figures: list[RunFigures], differences: list[list[Difference]]) -> dict[str, object]:
     first = figures[0]
     return {
         "bags": [{"bag": str(path), "figures": each} for path, each in zip(paths, figures, strict=True)],
@@ -59,7 +61,11 @@ def _summary(
                 "identical": not found,
                 "first_by_topic": [str(difference) for difference in found],
                 "figures": {
-                    part: {name: value - first[part][name] for name, value in values.items()}
+                    part: {
+                        name: value - other
+                        for name, value in values.items()
+                        if not isinstance(value, str) and not isinstance(other := first[part][name], str)
+                    }
                     for part, values in each.items()
                     if part in first
                 },
@@ -69,23 +75,25 @@ def _summary(
     }
 
 
-def _print(paths: list[Path], figures: list[dict[str, dict[str, float]]], differences: list[list[Difference]]) -> None:
+def _print(paths: list[Path], figures: list[RunFigures], differences: list[list[Difference]]) -> None:
     console = Console(highlight=False)
-    table = Table()
-    table.add_column("figure")
-    for path in paths:
-        table.add_column(escape(str(path)), justify="right")
-    for path in paths[1:]:
-        table.add_column(escape(f"{path.name} - {paths[0].name}"), justify="right")
-    rows = dict.fromkeys((part, name) for each in figures for part, values in each.items() for name in values)
-    for part, name in rows:
-        values = [each.get(part, {}).get(name) for each in figures]
-        first = values[0]
-        cells = ["" if value is None else f"{value:.6g}" for value in values]
-        for value in values[1:]:
-            cells.append("" if value is None or first is None else f"{value - first:+.3g}")
-        table.add_row(escape(f"{part} {name}".strip()), *cells)
-    console.print(table)
+    letters = string.ascii_uppercase if len(paths) <= len(string.ascii_uppercase) else list(map(str, range(len(paths))))
+    for letter, path in zip(letters, paths, strict=False):
+        console.print(f"{letter}: {path}", soft_wrap=True, markup=False)
+    labels: list[str] = []
+    values: list[list[str]] = [[] for _ in paths]
+    deltas: list[list[str]] = [[] for _ in paths[1:]]
+    for deputy in dict.fromkeys(name for each in figures for name in each):
+        for figure in FIGURES if deputy else RUN_FIGURES:
+            row = [each.get(deputy, {}).get(figure.name) for each in figures]
+            labels.append(f"{deputy} {figure.label}".strip())
+            for column, value in zip(values, row, strict=True):
+                column.append(figure.text(value))
+            for column, value in zip(deltas, row[1:], strict=True):
+                column.append(figure.difference(value, row[0]))
+    columns = [[letter, *column] for letter, column in zip(letters, values, strict=False)]
+    columns += [[f"{letter} - {letters[0]}", *column] for letter, column in zip(letters[1:], deltas, strict=False)]
+    print_table(console, [["figure", *labels], *columns])
     for path, found in zip(paths[1:], differences, strict=True):
         print(f"{path}: {IDENTICAL}" if not found else f"{path}: differs from {paths[0]}, first of each topic:")
         for difference in found:

@@ -1,7 +1,7 @@
 """Fly a scenario in software-in-the-loop, record it and print how well it flew.
 
 The node graph runs as real processes over DDS in a ROS domain of its own; with --in-process the same
-objects run in this process, to the same bits and faster.
+objects run in this process, to the same bits and faster. Exit status 3 means that the formation is lost.
 """
 
 import argparse
@@ -11,18 +11,30 @@ import sys
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
+from textwrap import fill
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
-from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
 from formation_gnc.control.registry import ALGORITHMS
 from formation_gnc.errors import ConfigurationError
+from formation_gnc.sil.overrides import overrides_of
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import Scenario, duration_of, load_scenario
+
+if TYPE_CHECKING:
+    from formation_gnc.analysis.metrics import RunFigures
+
+LOST_STATUS = 3
+"""Exit status of a run whose formation is lost."""
+
+COLUMNS = 2
+"""Deputies beyond which the summary has a row, not a column, for each."""
+
+HEADING = 10
+"""Characters of a line of the headings over such rows."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -39,6 +51,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         help="simulated seconds per wall second at most; 0: no limit",
     )
+    parser.add_argument(
+        "--set",
+        metavar="NODE.PARAMETER=VALUE",
+        action="append",
+        default=[],
+        help="any parameter of a node, as controller.algorithm=mpc or plant.deputy1.mass=80; repeatable",
+    )
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--in-process", action="store_true", help="fly in this process, without the node graph")
     where.add_argument(
@@ -50,6 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--display", action="store_true", help="draw the run as markers and transforms, for RViz or Foxglove"
     )
+    parser.add_argument("--accept-lost", action="store_true", help="exit with status 0 also when the formation is lost")
     parser.add_argument("--json", action="store_true", help="print the figures as one JSON object")
 
 
@@ -69,7 +89,7 @@ def run(options: argparse.Namespace) -> int:
     except RuntimeError as failure:
         print(f"formation-gnc: {failure}; {_closed(bag)}", file=sys.stderr)
         return 1
-    return _summarise(scenario, bag, speedup, options.json)
+    return _summarise(scenario, bag, speedup, options)
 
 
 def _scenario(options: argparse.Namespace) -> Scenario:
@@ -77,6 +97,8 @@ def _scenario(options: argparse.Namespace) -> Scenario:
     plant = {name: value for name, value in given.items() if value is not None}
     controller = {"algorithm": options.controller} if options.controller is not None else {}
     overrides: dict[str, dict[str, Any]] = {"/plant": plant, "/**/controller": controller}
+    for node, values in overrides_of(options.set).items():
+        overrides[node] = overrides.get(node, {}) | values
     scenario = load_scenario(options.scenario, overrides)
     if options.orbits is not None:
         overrides["/plant"]["duration"] = duration_of(options.orbits, scenario)
@@ -183,11 +205,12 @@ def _fly_in_process(scenario: Scenario, bag: Path, console: Console) -> float:
         return run.plant.tick * tick / (perf_counter() - started)
 
 
-def _summarise(scenario: Scenario, bag: Path, speedup: float, as_json: bool) -> int:
+def _summarise(scenario: Scenario, bag: Path, speedup: float, options: argparse.Namespace) -> int:
     from formation_gnc.analysis.metrics import figures
     from formation_gnc.analysis.overview import draw_overview
     from formation_gnc.analysis.run_history import RunHistory
     from formation_gnc.analysis.separation import predicted_approach
+    from formation_gnc.analysis.verdict import Verdict
     from formation_gnc.recording.reader import Bag
 
     recorded = Bag(bag)
@@ -198,10 +221,12 @@ def _summarise(scenario: Scenario, bag: Path, speedup: float, as_json: bool) -> 
         "least predicted without thrust": predicted_approach(recorded, "passive"),
     }
     picture = draw_overview(flown, bag / "overview.png", scenario.name)
-    if as_json:
+    status = LOST_STATUS if result.verdict is Verdict.LOST and not options.accept_lost else 0
+    if options.json:
         summary = {
             "scenario": scenario.name,
             "seed": scenario.plant.seed,
+            "verdict": result.verdict,
             "ticks": result.ticks,
             "misses": result.misses,
             "speedup": speedup,
@@ -215,31 +240,35 @@ def _summarise(scenario: Scenario, bag: Path, speedup: float, as_json: bool) -> 
             if each is not None:
                 summary[name] = each.distance
         print(json.dumps(summary, indent=2))
-        return 0
-    table = Table(title=f"{scenario.name}, seed {scenario.plant.seed}", title_justify="left")
-    table.add_column("figure")
-    for name in result.deputies:
-        table.add_column(name, justify="right")
-    deputies = list(result.deputies.values())
-    rows = {
-        "final position error [m]": [f"{each.final_error_m:.3f}" for each in deputies],
-        "RMS position error [m]": [f"{each.rms_error_m:.3f}" for each in deputies],
-        "RMS estimation error [m]": [f"{each.estimate_rms_m:.3f}" for each in deputies],
-        "mean NIS [-]": [f"{each.mean_nis:.3f}" for each in deputies],
-        "delta-v x, y, z [mm/s]": [
-            ", ".join(f"{1e3 * axis:.2f}" for axis in each.delta_v_axes_m_s) for each in deputies
-        ],
-        "delta-v total [mm/s]": [f"{1e3 * each.delta_v_m_s:.2f}" for each in deputies],
-    }
-    for label, values in rows.items():
-        table.add_row(escape(label), *values)
+        return status
     console = Console(highlight=False)
-    console.print(table)
+    _print_figures(console, f"{scenario.name}, seed {scenario.plant.seed}", result)
     lost = f", {recorded.lost} messages not recorded" if recorded.lost else ""
     console.print(f"{result.ticks} ticks, {result.misses} missed{lost}, {speedup:,.0f} x real time")
+    lost_deputies = [name for name, each in result.deputies.items() if each.verdict is Verdict.LOST]
+    console.print(f"formation {result.verdict}" + (f": {', '.join(lost_deputies)}" if lost_deputies else ""))
     for label, separation in separations.items():
         if separation is not None:
             pair = " and ".join(separation.pair)
             console.print(f"{label}: {separation.distance:.1f} m, {pair} at {separation.time:.0f} s")
     console.print(f"bag: {bag}\npicture: {picture}", soft_wrap=True)
-    return 0
+    return status
+
+
+def _print_figures(console: Console, title: str, result: "RunFigures") -> None:
+    """Figures by deputy: a column for each deputy, or of a fleet a row."""
+    from formation_gnc.analysis.figure_table import FIGURES
+    from formation_gnc.commands.tables import print_table
+
+    by_deputy = {name: each.by_name() for name, each in result.deputies.items()}
+    if len(by_deputy) > COLUMNS:
+        columns = [["deputy", *by_deputy]]
+        for figure in FIGURES:
+            columns.append(
+                [fill(figure.label, HEADING), *(figure.text(values[figure.name]) for values in by_deputy.values())]
+            )
+    else:
+        columns = [["figure", *(figure.label for figure in FIGURES)]]
+        for name, values in by_deputy.items():
+            columns.append([name, *(figure.text(values[figure.name]) for figure in FIGURES)])
+    print_table(console, columns, title)

@@ -3,7 +3,7 @@
 import math
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -99,6 +99,10 @@ class FlightModule[P: ModuleParameters, D](ABC):
 
     def check_plan(self, start: Configuration[P, D], plan: Plan[P, D]) -> None:  # noqa: B027 - optional
         """Raise ConfigurationError for scheduled changes that may not follow one another, or `start`."""
+
+    def first_of(self, waiting: Sequence[Any]) -> Any:
+        """Where to go on among inputs that wait: by default with the last, since the others are too late."""
+        return waiting[-1]
 
     @property
     def waiting_for(self) -> str:

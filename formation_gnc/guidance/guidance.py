@@ -22,7 +22,15 @@ from formation_gnc.guidance.reconfiguration import (
 from formation_gnc.guidance.separation import SeparationMonitor, describe, predict
 from formation_gnc.guidance.slots import MAX_RANGE, SlotAssigner, check_assignment, design_path
 from formation_gnc.guidance.targets import TargetPath
-from formation_gnc.records import NO_NEIGHBOURS, EventKind, NavigationState, Separation, Target
+from formation_gnc.parameters import to_json
+from formation_gnc.records import (
+    NO_NEIGHBOURS,
+    EventKind,
+    NavigationState,
+    ParameterChange,
+    Separation,
+    Target,
+)
 from formation_gnc.types import NANOSECONDS, Vector
 
 MODEL_ERROR = 0.05
@@ -165,13 +173,18 @@ class Guidance(FlightModule[GuidanceParameters, TargetPath]):
             return
         index = self.parameters.fleet.index(self._deputy)
         slot, phase = assignment.slots[index], assignment.phase
-        self.configuration = self.derive(self.parameters, {"slot": slot, "phase": phase})
+        previous = self.parameters
+        self.configuration = self.derive(previous, {"slot": slot, "phase": phase})
         self.log(
             estimate.time,
             EventKind.ASSIGNMENT,
             f"slot {slot}, phase {phase:.4f} rad, "
             f"{assignment.delta_v[index]:.3g} m/s of the fleet's {sum(assignment.delta_v):.3g} m/s",
             self.parameters.formation,
+            [
+                ParameterChange("slot", to_json(previous.slot), to_json(slot)),
+                ParameterChange("phase", to_json(previous.phase), to_json(phase)),
+            ],
         )
 
     def _report_target(self, new: NewTarget, estimate: NavigationState, target: Vector) -> None:

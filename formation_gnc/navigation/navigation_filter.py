@@ -132,6 +132,12 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         reject(Rejection.OUT_OF_ORDER if gap < 0 else Rejection.FUTURE, "measurement")
         return _Action.IGNORE
 
+    def first_of(self, waiting: Sequence[Measurement]) -> Measurement:
+        """The last with an acquisition fix, without a state; the last otherwise."""
+        if self._state is None:
+            return next((each for each in reversed(waiting) if _has_plausible_fix(each)), waiting[-1])
+        return waiting[-1]
+
     @property
     def waiting_for(self) -> str:
         """An acquisition fix, without a state."""

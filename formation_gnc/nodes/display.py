@@ -17,7 +17,7 @@ from formation_gnc.transport.conversion import from_cdr
 from formation_gnc.transport.markers import DisplayParameters, markers, transforms
 from formation_gnc.transport.node import ConfiguredNode
 from formation_gnc.transport.process import run
-from formation_gnc.transport.qos import LATEST, quality
+from formation_gnc.transport.qos import quality
 from formation_gnc.transport.raw_topics import first_stamp
 from formation_gnc.transport.subscriptions import Information
 from formation_gnc.types import NANOSECONDS, Vector
@@ -33,9 +33,7 @@ class DisplayNode(ConfiguredNode):
     def __init__(self) -> None:
         """Subscribe to the truth, and to the targets of the deputies in it."""
         super().__init__("display", DisplayParameters)
-        self._marker_publisher = self.create_publisher(
-            MarkerArray, self.full_name(topics.MARKERS.name), quality(LATEST)
-        )
+        self._marker_publisher = self.create_publisher(MarkerArray, self.full_name(topics.MARKERS.name), quality())
         self._publish_transforms = self._transform_publisher()
         self._truth: bytes | None = None
         self._targets: dict[str, bytes] = {}
@@ -50,7 +48,7 @@ class DisplayNode(ConfiguredNode):
         except ImportError:
             single = self.create_publisher(TransformStamped, self.full_name(topics.TRANSFORMS.name), quality())
             return lambda transforms: [single.publish(each) for each in transforms]
-        together = self.create_publisher(TFMessage, self.full_name(topics.TF.name), quality(LATEST))
+        together = self.create_publisher(TFMessage, self.full_name(topics.TF.name), quality())
         return lambda transforms: together.publish(TFMessage(transforms=transforms))
 
     def _on_truth(self, data: bytes, _: Information) -> None:

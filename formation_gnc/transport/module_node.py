@@ -7,7 +7,6 @@ from time import perf_counter, time_ns
 from typing import Any
 
 from rclpy.service import Service
-from rclpy.timer import Timer
 
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import ModuleInstance, Row
@@ -23,6 +22,9 @@ from formation_gnc.types import NANOSECONDS
 SETTLING = 0.1
 """Wall time (s) for which a node that finds messages from before its start waits for more of them."""
 
+LATE = 50_000_000
+"""Wall time (ns) after which a message that is received counts as one of several that wait."""
+
 INPUT_DEPTH = HISTORY
 """Messages of an input that may wait: those that come at once to a node which is still starting, or is busy."""
 
@@ -34,8 +36,9 @@ class ModuleNode(ConfiguredNode):
     that no answer waits for it, and takes effect at the next tick; it is answered when that is settled, with
     the reason if it is rejected.
 
-    A node that comes late finds what was published before, and answers its last tick only: an answer to an older
-    one would look like a new run to those who have gone on. What is published from its start on it takes all.
+    A node that comes late, or has been busy, finds several messages, and answers the last tick only: an answer to
+    an older one would look like a new run to those who have gone on. What its module cannot start without is not
+    skipped, if it was published after the node's start.
     """
 
     def __init__(self, row: Row, bus: IntraProcessBus | None = None) -> None:
@@ -53,10 +56,10 @@ class ModuleNode(ConfiguredNode):
         self._publish_event = self.publisher_of(Event, topics.EVENTS.name)
         self._publish_timing = self.publisher_of(Timing, topics.TIMING.name)
         self._started = time_ns()
-        self._latest: dict[str, bytes] = {}
-        self._settling: Timer | None = None
+        self._waiting: dict[str, list[tuple[int, bytes]]] = {}
+        self._catch_up_soon = self.create_wall_timer(SETTLING, self._catch_up)
+        self._catch_up_soon.cancel()
         self._decoders: dict[str, Callable[[bytes], Any]] = {}
-        self._settled = next(iter(self._instance.inputs)) in self._bus
         for topic, record in {**self._instance.inputs, **self._instance.inputs_of_others}.items():
             self._subscribe_input(topic, record)
         self._designer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="design")
@@ -83,26 +86,30 @@ class ModuleNode(ConfiguredNode):
             self.subscribe(record, topic, partial(self._receive, topic), INPUT_DEPTH)
 
     def _receive(self, topic: str, data: bytes, about: Information) -> None:
-        if not self._settled:
-            if about["source_timestamp"] < self._started:
-                self._keep(topic, data)
-                return
-            self._settle()
-        self._take(topic, self._decoders[topic](data))
-
-    def _keep(self, topic: str, data: bytes) -> None:
-        """Keep the latest message from before the start."""
-        if not self._latest:
-            self._settling = self.create_wall_timer(SETTLING, self._settle)
-        self._latest[topic] = data
-
-    def _settle(self) -> None:
-        """Answer the last tick from before the start."""
-        self._settled = True
-        if self._settling is not None:
-            self._settling.cancel()
-        for topic, data in self._latest.items():
+        published = about["source_timestamp"]
+        if not self._waiting and time_ns() - published < LATE:
             self._take(topic, self._decoders[topic](data))
+            return
+        if not self._waiting:
+            self._catch_up_soon.reset()
+        self._waiting.setdefault(topic, []).append((published, data))
+
+    def _catch_up(self) -> None:
+        """Go on with the last tick of those that wait, or with what the module cannot do without."""
+        self._catch_up_soon.cancel()
+        waiting, self._waiting = self._waiting, {}
+        records = {
+            topic: [(published, self._decoders[topic](data)) for published, data in messages]
+            for topic, messages in waiting.items()
+        }
+        pacing = records.get(next(iter(self._instance.inputs)), [])
+        addressed = [record for published, record in pacing[:-1] if published >= self._started]
+        addressed += [record for _, record in pacing[-1:]]
+        first = self._module.first_of(addressed).time if addressed else 0
+        for topic, messages in records.items():
+            kept = [record for _, record in messages if record.time >= first]
+            for record in kept if pacing else kept[-1:]:
+                self._take(topic, record)
 
     def _take(self, topic: str, record: Any) -> None:
         """Answer the tick when the last input of its stamp is there; the outputs go first, others wait for them."""

@@ -115,5 +115,5 @@ def test_the_overview_has_all_deputies_and_the_fleet(
     drawn: list[str] = []
     monkeypatch.setattr(overview, "draw", lambda _figure, _place, plot: drawn.append(plot.title))
     assert draw_overview(fleet, tmp_path / "overview.png", "four").read_bytes().startswith(b"\x89PNG")
-    assert drawn.count("control error") == drawn.count("thrust and delta-v") == 4
-    assert drawn[-1] == "distances between deputies"
+    assert drawn.count("control error") == drawn.count("acceleration by thrust, and delta-v") == 4
+    assert drawn[:2] == ["relative trajectory", "distances between deputies"]

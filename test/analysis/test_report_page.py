@@ -52,8 +52,10 @@ def test_the_page_is_self_contained_and_describes_the_run(page: Path, bag: Bag) 
     assert "a &lt;title&gt;" in text
     assert "&lt;b&gt;bold&lt;/b&gt;" in text, "text of a bag is never markup"
     delta_v = 1e3 * figures(bag).deputies["deputy1"].delta_v_m_s
-    (shown,) = re.findall(r"delta-v of deputy1</th><td>([\d.]+) mm/s", text)
-    assert float(shown) == pytest.approx(delta_v, abs=0.0006), "the sum over all ticks, not over the drawn ones"
+    (shown,) = re.findall(r"delta-v \[mm/s\]</th><td>([\d.]+)<", text)
+    assert float(shown) == pytest.approx(delta_v, abs=0.006), "the sum over all ticks, not over the drawn ones"
+    assert "control law at the end</th><td>coast" in text
+    assert "formation</th><td>held" in text
 
 
 @pytest.mark.skipif(BROWSER is None, reason="chromium is not installed")
@@ -78,7 +80,8 @@ def test_a_browser_shows_the_page_and_its_slider_moves_every_deputy(
       Plotly.restyle(all[1], {visible: 'legendonly'}, [0]);
       setTimeout(() => {
         const moved = where().filter((y, deputy) => y !== before[deputy]).length;
-        document.title = `shown ${[all.length, steps.length, drawn, moved, all[1].data[0].visible]}`;
+        const fits = document.documentElement.scrollWidth <= window.innerWidth;
+        document.title = `shown ${[all.length, steps.length, drawn, moved, all[1].data[0].visible, fits]}`;
       }, 2000);
     }, 1000));</script></body>"""
     probe.write_text(page.read_text().replace("</body>", script))
@@ -87,6 +90,7 @@ def test_a_browser_shows_the_page_and_its_slider_moves_every_deputy(
         "--enable-unsafe-swiftshader",
         "--enable-logging=stderr",
         "--v=0",
+        "--window-size=400,800",
         "--virtual-time-budget=60000",
     ]
     result = subprocess.run(
@@ -102,4 +106,4 @@ def test_a_browser_shows_the_page_and_its_slider_moves_every_deputy(
     assert "slider-container" in result.stdout
     title = re.search(r"<title>shown (.*)</title>", result.stdout)
     assert title is not None, console
-    assert title[1] == f"{plots},120,true,{deputies},legendonly"
+    assert title[1] == f"{plots},120,true,{deputies},legendonly,true"

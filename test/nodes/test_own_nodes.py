@@ -95,8 +95,13 @@ def test_the_plant_hears_commands_of_any_quality_of_service(bench: Bench, profil
         bench.user.create_publisher(message_type(record), f"/deputy1/{row}", 10)
     publisher = bench.user.create_publisher(message_type(Thrust), topics.THRUST.of("deputy1"), PROFILES[profile])
     executive = node.executive
+
+    def stamp() -> int:
+        executive.check(0.0)
+        return executive.simulation.barrier.stamp
+
     for tick in range(3):
-        bench.spin(node, until=lambda: (executive.check(0.0), executive.simulation.barrier.stamp)[1] == tick * 10**9)
+        bench.spin(node, until=lambda tick=tick: stamp() == tick * 10**9)  # type: ignore[misc]
         publisher.publish(to_cdr(Thrust(tick * 10**9, np.full(3, 1e-3))))
     bench.spin(node, until=lambda: executive.simulation.plant.tick == 3)
     assert executive.simulation.misses == 0

@@ -13,16 +13,12 @@ from typing import Any
 
 import domain_coordinator
 import pytest
-import rclpy
-from rcl_interfaces.srv import SetParameters
-from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.parameter import Parameter
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight.graph import MODULES
 from formation_gnc.recording import Bag
 from formation_gnc.sil.scenario import find_scenario
+from formation_gnc.transport.parameter_client import set_parameters
 from formation_gnc.transport.processes import executable
 
 GNC_TOPICS = (
@@ -53,23 +49,12 @@ def has_messages(bag: Path, topic: str) -> bool:
 
 
 def set_parameter(domain: int, node: str, name: str, value: Any) -> tuple[bool, str]:
-    """Set a parameter through the standard service, as `ros2 param set` does."""
-    context = Context()
-    rclpy.init(context=context, domain_id=domain)
-    user = rclpy.create_node("user", context=context)
-    executor = SingleThreadedExecutor(context=context)
-    executor.add_node(user)
+    """Set a parameter as `formation-gnc set` does: whether it was accepted, and if not, why."""
     try:
-        client = user.create_client(SetParameters, f"{node}/set_parameters")
-        assert client.wait_for_service(timeout_sec=PATIENCE)
-        request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
-        answer = client.call_async(request)
-        executor.spin_until_future_complete(answer, timeout_sec=PATIENCE)
-        result = answer.result().results[0]
-        return bool(result.successful), str(result.reason)
-    finally:
-        user.destroy_node()
-        rclpy.shutdown(context=context)
+        set_parameters(node, {name: value}, domain)
+    except ConfigurationError as rejection:
+        return False, str(rejection)
+    return True, ""
 
 
 class Terminal:

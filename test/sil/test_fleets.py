@@ -89,8 +89,8 @@ def test_fleet_has_equal_bits_on_graph_composed_in_process_and_replayed(
     assert kinds.count(EventKind.ASSIGNMENT) == 8  # by each guidance, at the start and at the change
     assert kinds.count(EventKind.RECONFIGURATION) == 4
     slots = [
-        detail.split("slot ")[1].split(",")[0]
-        for detail, kind, tick in zip(events["detail"].tolist(), kinds, events["tick"].tolist(), strict=True)
+        slot
+        for slot, kind, tick in zip(events["changes.0.new_value"].tolist(), kinds, events["tick"].tolist(), strict=True)
         if kind == EventKind.ASSIGNMENT and tick == 40
     ]
     assert sorted(slots) == ["0", "1", "2", "3"]

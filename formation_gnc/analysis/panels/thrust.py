@@ -1,4 +1,4 @@
-"""Thrust and delta-v."""
+"""Acceleration by thrust, and delta-v."""
 
 from formation_gnc.analysis.deputy_history import DeputyHistory
 from formation_gnc.analysis.panels.panel import HISTORY, DeputyPanel
@@ -12,7 +12,11 @@ def plots(deputy: DeputyHistory) -> list[Plot]:
         for axis, (label, colour) in enumerate(zip(HILL_AXES, AXIS_COLOURS, strict=True))
     ]
     curves.append(Curve("delta-v", deputy.time, 1e3 * deputy.delta_v, Style(GREY, width=1.5), right=True))
-    return [Plot("thrust and delta-v", TIME, Axis("thrust", "µm/s²"), curves, Axis("delta-v", "mm/s"))]
+    return [
+        Plot(
+            "acceleration by thrust, and delta-v", TIME, Axis("acceleration", "µm/s²"), curves, Axis("delta-v", "mm/s")
+        )
+    ]
 
 
 THRUST = DeputyPanel("thrust", plots, HISTORY)

@@ -30,4 +30,4 @@ def _curve(label: str, states: Matrix, style: Style) -> Curve:
     return Curve(label, states[:, 1], states[:, 0], style, z=states[:, 2])
 
 
-TRAJECTORY = FleetPanel("trajectory", plots, "Relative trajectory", in_overview=False)
+TRAJECTORY = FleetPanel("trajectory", plots, "Relative trajectory")

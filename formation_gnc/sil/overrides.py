@@ -1,0 +1,58 @@
+"""Parameters given beside a scenario: `NODE.PARAMETER=VALUE`, the value as in a parameter file."""
+
+import difflib
+from collections.abc import Iterable
+from typing import Any
+
+import yaml
+
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.flight.graph import MODULES
+from formation_gnc.parameters import read_yaml
+
+FORM = "NODE.PARAMETER=VALUE, as controller.algorithm=mpc"
+
+
+def overrides_of(entries: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Values by node pattern and dotted name, those of all deputies before those of one.
+
+    NODE is `plant`, the name of a module for that of every deputy, `DEPUTY/MODULE`, or a pattern that begins
+    with a slash, as in a parameter file. A value given twice is the later one.
+
+    Raises:
+        ConfigurationError: an entry has another form, an unknown node or no YAML value.
+    """
+    overrides: dict[str, dict[str, Any]] = {}
+    for entry in entries:
+        target, equals, text = entry.partition("=")
+        node, dot, name = target.strip().partition(".")
+        if not (equals and dot and node and name):
+            raise ConfigurationError(f"set {entry!r}: is not allowed; it must be like {FORM}")
+        overrides.setdefault(_pattern(node, entry), {})[name] = parse_value(name, text)
+    return dict(sorted(overrides.items(), key=lambda item: "*" not in item[0]))
+
+
+def parse_value(name: str, text: str) -> Any:
+    """A value as a parameter file has it; raises ConfigurationError for none."""
+    try:
+        value = read_yaml(text)
+    except (yaml.YAMLError, ValueError) as error:
+        raise ConfigurationError(f"parameter {name}: {text!r} is not YAML ({' '.join(str(error).split())})") from None
+    if value is None or isinstance(value, dict):
+        raise ConfigurationError(f"parameter {name}: {text!r} is not allowed; it must be a value or a list of them")
+    return value
+
+
+def _pattern(node: str, entry: str) -> str:
+    """Pattern of a parameter file for a node as given."""
+    if node.startswith("/"):
+        return node
+    deputy, slash, module = node.rpartition("/")
+    known = MODULES if slash else ("plant", *MODULES)
+    if module not in known:
+        near = difflib.get_close_matches(module, known, n=1)
+        hint = f"did you mean {near[0]}?" if near else f"it must be one of {', '.join(known)}"
+        raise ConfigurationError(f"set {entry!r}: node {node} is unknown; {hint}")
+    if module == "plant":
+        return "/plant"
+    return f"/{deputy}/{module}" if slash else f"/**/{module}"
