@@ -138,3 +138,13 @@ def deputy_of(name: str) -> str:
 def deputies_in(names: "list[str] | dict[str, Any]") -> list[str]:
     """Deputies that have a measurement among full topic names, sorted."""
     return sorted(deputy_of(name) for name in names if name == MEASUREMENT.of(deputy_of(name)))
+
+
+def types_of(name: str) -> list[str]:
+    """Message types, such as `formation_gnc_msgs/msg/Thrust`, of a run's topic of this full name; none for others."""
+    known = [each for each in RUN_TOPICS if each.name == name]
+    if deputy_of(name):
+        known += [each for each in DEPUTY_TOPICS if each.of(deputy_of(name)) == name]
+    messages = [each.record.message if each.record else each.message for each in known]
+    packages = [message.rpartition("/") for message in messages]
+    return [f"{package or 'formation_gnc_msgs'}/msg/{kind}" for package, _, kind in packages]

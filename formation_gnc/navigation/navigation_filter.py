@@ -1,5 +1,6 @@
 """Relative navigation of one deputy, from measurement to estimate."""
 
+from collections.abc import Sequence
 from enum import Enum
 
 import numpy as np

@@ -22,6 +22,9 @@ from formation_gnc.types import NANOSECONDS
 SETTLING = 0.1
 """Wall time (s) for which a node that finds messages from before its start waits for more of them."""
 
+SOON = 1_000_000
+"""The same (ns) for a node that has been busy: what has come meanwhile is received within this time."""
+
 LATE = 50_000_000
 """Wall time (ns) after which a message that is received counts as one of several that wait."""
 
@@ -97,6 +100,7 @@ class ModuleNode(ConfiguredNode):
     def _catch_up(self) -> None:
         """Go on with the last tick of those that wait, or with what the module cannot do without."""
         self._catch_up_soon.cancel()
+        self._catch_up_soon.timer_period_ns = SOON
         waiting, self._waiting = self._waiting, {}
         records = {
             topic: [(published, self._decoders[topic](data)) for published, data in messages]

@@ -4,8 +4,9 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
-from rclpy.qos import QoSDurabilityPolicy
+from rclpy.qos import QoSDurabilityPolicy, QoSProfile, QoSReliabilityPolicy
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
@@ -35,10 +36,16 @@ class RawTopics:
         """
         self._node, self._open = node, open_topic
         self._known: set[str] = set()
+        self._unheard: set[str] = set()
+        self._receivers: dict[str, tuple[Any, Callable[..., None]]] = {}
+        self._subscriptions: dict[str, Any] = {}
         self._time = 0
 
     def look(self) -> None:
-        """Subscribe to the topics that have appeared since."""
+        """Subscribe to the topics that have appeared since, and again where a writer is not heard."""
+        for topic in list(self._unheard):
+            self._subscribe_to_offers(topic)
+        self._unheard.clear()
         for topic, (type_name, *_) in self._node.get_topic_names_and_types():
             if topic not in self._known:
                 self._known.add(topic)
@@ -49,10 +56,7 @@ class RawTopics:
 
     def _subscribe(self, topic: str, type_name: str) -> None:
         kind = message_class(type_name)
-        offers = self._node.get_publishers_info_by_topic(topic)
-        qos = quality()
-        if any(offer.qos_profile.durability == QoSDurabilityPolicy.VOLATILE for offer in offers):
-            qos.durability = QoSDurabilityPolicy.VOLATILE
+        qos = self._offered(topic)
         take = self._open(topic, type_name, qos.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL)
         is_clock = topic == topics.CLOCK.name
         stamped = is_clock or "std_msgs/Header" in list(kind.get_fields_and_field_types().values())[:1]
@@ -65,7 +69,27 @@ class RawTopics:
                 self._time = stamp
             take(data, stamp, about["publication_sequence_number"])
 
-        self._node.create_subscription(kind, topic, with_information(receive), qos, raw=True)
+        self._receivers[topic] = (kind, with_information(receive))
+        self._subscribe_to_offers(topic)
+
+    def _offered(self, topic: str) -> QoSProfile:
+        """The most demanding quality of service that hears every writer there is."""
+        qos = quality()
+        for offer in (each.qos_profile for each in self._node.get_publishers_info_by_topic(topic)):
+            if offer.durability == QoSDurabilityPolicy.VOLATILE:
+                qos.durability = QoSDurabilityPolicy.VOLATILE
+            if offer.reliability == QoSReliabilityPolicy.BEST_EFFORT:
+                qos.reliability = QoSReliabilityPolicy.BEST_EFFORT
+        return qos
+
+    def _subscribe_to_offers(self, topic: str) -> None:
+        if topic in self._subscriptions:
+            self._node.destroy_subscription(self._subscriptions[topic])
+        kind, receive = self._receivers[topic]
+        events = SubscriptionEventCallbacks(incompatible_qos=lambda _: self._unheard.add(topic))
+        self._subscriptions[topic] = self._node.create_subscription(
+            kind, topic, receive, self._offered(topic), raw=True, event_callbacks=events
+        )
 
 
 def first_stamp(data: bytes) -> int:
