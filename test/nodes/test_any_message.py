@@ -99,7 +99,7 @@ CASES = [(row, each) for row in GRAPH for each in (*row.takes, *row.takes_of_oth
 @pytest.mark.parametrize(
     ("row", "hostile"), CASES, ids=lambda each: each.name if isinstance(each, Row) else each.topic.name
 )
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=15)
 @given(data=st.data())
 def test_a_module_stands_any_message_and_answers_the_next_tick(
     scenario: Scenario, flown: dict[str, list[Any]], row: Row, hostile: Input, data: st.DataObject
