@@ -50,6 +50,11 @@ class PlantNode(ConfiguredNode):
         """Whether anybody publishes a topic."""
         return bool(self.count_publishers(self.full_name(topic)))
 
+    def publishers(self, topic: str) -> list[str]:
+        """Full names of the nodes that publish a topic."""
+        offers = self.get_publishers_info_by_topic(self.full_name(topic))
+        return [f"{each.node_namespace.rstrip('/')}/{each.node_name}" for each in offers]
+
     def has_recorder(self) -> bool:
         """Whether a recorder reports progress."""
         return self.is_published(topics.PROGRESS.name)
