@@ -8,12 +8,14 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import TransformStamped
 from visualization_msgs.msg import MarkerArray
 
 from formation_gnc.flight import topics
 from formation_gnc.records import Target, Truth
 from formation_gnc.transport.conversion import from_cdr
+from formation_gnc.transport.diagnostics import PERIOD, DiagnosticsPublisher
 from formation_gnc.transport.markers import DisplayParameters, markers, transforms
 from formation_gnc.transport.node import ConfiguredNode
 from formation_gnc.transport.process import run
@@ -40,6 +42,8 @@ class DisplayNode(ConfiguredNode):
         self._trails: dict[str, deque[Vector]] = {}
         self._trail_time = -1
         self.subscribe(Truth, topics.TRUTH.name, self._on_truth)
+        self._diagnostics = DiagnosticsPublisher(self, self.full_name("") or "/")
+        self.create_wall_timer(PERIOD, self._diagnose)
         self.create_wall_timer(1.0 / self.values.rate, self._draw)
 
     def _transform_publisher(self) -> Callable[[list[TransformStamped]], object]:
@@ -66,6 +70,12 @@ class DisplayNode(ConfiguredNode):
 
     def _on_target(self, deputy: str, data: bytes, _: Information) -> None:
         self._targets[deputy] = data
+
+    def _diagnose(self) -> None:
+        is_waiting = self._trail_time < 0
+        level = DiagnosticStatus.WARN if is_waiting else DiagnosticStatus.OK
+        message = f"waiting for {topics.TRUTH.name}" if is_waiting else "drawing"
+        self._diagnostics.publish(level, message, {"satellites": len(self._targets) + 1}, self._trail_time)
 
     def _draw(self) -> None:
         """Publish the latest, if there is any."""

@@ -11,7 +11,7 @@ from formation_gnc.flight.graph import COMMAND, every_tick
 from formation_gnc.plant.parameters import PlantParameters
 from formation_gnc.records import Clock, Event, Measurement, Thrust, Truth
 from formation_gnc.sil.plant_executive import PlantExecutive, Report
-from formation_gnc.transport.diagnostics import ReportPublisher
+from formation_gnc.transport.diagnostics import RUN, DiagnosticsPublisher
 from formation_gnc.transport.node import ConfiguredNode
 from formation_gnc.transport.process import run, stop_requested
 
@@ -26,7 +26,7 @@ class PlantNode(ConfiguredNode):
         records = {topics.TRUTH.name: Truth, topics.EVENTS.name: Event, topics.CLOCK.name: Clock}
         records |= {topics.MEASUREMENT.of(name): Measurement for name in deputies}
         self._publish = {topic: self.publisher_of(record, topic) for topic, record in records.items()}
-        self._report = ReportPublisher(self)
+        self._diagnostics = DiagnosticsPublisher(self, self.full_name("") or "/", RUN)
         recorded = {*records, *(topic for name in deputies for topic in every_tick(name))}
         self._recorded_topics = set(map(self.full_name, recorded))
         self.executive = PlantExecutive(self.values, self)
@@ -50,7 +50,7 @@ class PlantNode(ConfiguredNode):
         """Whether anybody publishes a topic."""
         return bool(self.count_publishers(self.full_name(topic)))
 
-    def publishers(self, topic: str) -> list[str]:
+    def publishers_of(self, topic: str) -> list[str]:
         """Full names of the nodes that publish a topic."""
         offers = self.get_publishers_info_by_topic(self.full_name(topic))
         return [f"{each.node_namespace.rstrip('/')}/{each.node_name}" for each in offers]
@@ -76,7 +76,7 @@ class PlantNode(ConfiguredNode):
 
     def report(self, report: Report) -> None:
         """Publish where the run is."""
-        self._report(report, self.executive.simulation.plant.time)
+        self._diagnostics.publish_report(report, self.executive.simulation.plant.time)
 
 
 def fly(node: PlantNode) -> None:
@@ -84,6 +84,9 @@ def fly(node: PlantNode) -> None:
     executive = node.executive
     node.spin(lambda: stop_requested() or executive.check(monotonic()), lambda: executive.period(monotonic()))
     node.spin(lambda: stop_requested() or executive.recorder_is_done())
+    figures = executive.simulation.figures(0.0)
+    how = "finished" if executive.finished else "stopped"
+    node.log(f"{how}: {figures['tick']} of {figures['ticks']} ticks flown, {figures['misses']} missed")
 
 
 def main() -> int:

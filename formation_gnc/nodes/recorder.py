@@ -8,6 +8,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import Trigger
 
 from formation_gnc.flight import topics
@@ -17,11 +18,13 @@ from formation_gnc.recording.session import RecordingSession
 from formation_gnc.recording.writer import FLUSH_INTERVAL, BagWriter, Split
 from formation_gnc.records import Clock, Event
 from formation_gnc.transport.conversion import codec
+from formation_gnc.transport.diagnostics import PERIOD, DiagnosticsPublisher
 from formation_gnc.transport.node import ConfiguredNode
 from formation_gnc.transport.parameter_reader import ParameterReader
 from formation_gnc.transport.process import run, stop_requested
 from formation_gnc.transport.qos import LATEST
 from formation_gnc.transport.raw_topics import Callback, RawTopics
+from formation_gnc.types import NANOSECONDS
 
 LOOK_PERIOD = 0.1
 """Wall time (s) between looks for new topics and nodes, and between reports of progress."""
@@ -51,6 +54,8 @@ class RecorderNode(ConfiguredNode):
             values.snapshot,
         )
         self.get_logger().info(f"recording to {directory}")
+        self._diagnostics = DiagnosticsPublisher(self, self.full_name("") or "/")
+        self.create_wall_timer(PERIOD, self._diagnose)
         self._raw_topics = RawTopics(self, self._open)
         self._reader = ParameterReader(self)
         if values.snapshot:
@@ -75,6 +80,18 @@ class RecorderNode(ConfiguredNode):
         if lost := session.new_losses():
             self.get_logger().warning(f"lost so far: {', '.join(f'{n} of {topic}' for topic, n in lost.items())}")
 
+    def _diagnose(self) -> None:
+        failure, lost, stamp = self.session.failure, self.session.lost, self.session.progress.stamp
+        level, message = DiagnosticStatus.OK, "recording"
+        if lost:
+            level, message = DiagnosticStatus.WARN, "messages were lost"
+        elif stamp < 0:
+            level, message = DiagnosticStatus.WARN, "waiting for a run"
+        if failure is not None:
+            level, message = DiagnosticStatus.ERROR, str(failure)
+        values = {"bag": self.session.bag.directory, "recorded_to": max(0, stamp) / NANOSECONDS, "lost": lost}
+        self._diagnostics.publish(level, message, values, stamp)
+
     def _on_snapshot(self, _request: Any, response: Any) -> Any:
         response.success, response.message = self.session.write_snapshot()
         return response
@@ -88,6 +105,8 @@ def record(node: RecorderNode) -> None:
         node.spin(lambda: session.is_quiet() or session.failure is not None, lambda: QUIET)
     finally:
         session.close()
+    stamp = max(0, session.progress.stamp) / NANOSECONDS
+    node.get_logger().info(f"closed {session.bag.directory}: recorded to {stamp:g} s, {session.lost} messages lost")
     if session.failure is not None:
         raise session.failure
 

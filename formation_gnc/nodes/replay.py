@@ -4,6 +4,7 @@ from functools import partial
 from time import monotonic
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import SetBool, Trigger
 
 from formation_gnc.errors import ConfigurationError
@@ -11,6 +12,7 @@ from formation_gnc.flight import topics
 from formation_gnc.recording.player import PlayedTick, ReplayParameters, TickPlayer
 from formation_gnc.records import Clock, Thrust
 from formation_gnc.transport.conversion import message_class
+from formation_gnc.transport.diagnostics import PERIOD, DiagnosticsPublisher
 from formation_gnc.transport.node import ConfiguredNode
 from formation_gnc.transport.process import run, stop_requested
 from formation_gnc.transport.qos import quality
@@ -36,6 +38,8 @@ class ReplayNode(ConfiguredNode):
         self._publish_clock = self.publisher_of(Clock, topics.CLOCK.name)
         for name in sorted(self.player.answers):
             self.subscribe(Thrust, name, partial(self._on_answer, name))
+        self._diagnostics = DiagnosticsPublisher(self, self.full_name("") or "/")
+        self.create_wall_timer(PERIOD, self._diagnose)
         self.create_service(SetBool, "~/pause", self._on_pause)
         self.create_service(Trigger, "~/step", self._on_step)
 
@@ -66,6 +70,13 @@ class ReplayNode(ConfiguredNode):
             if self.player.stamp == before:
                 break
         return self.player.done
+
+    def _diagnose(self) -> None:
+        player = self.player
+        message = "paused" if player.paused else "at the end" if player.done else "playing"
+        stamp = player.stamp or 0
+        values = {"bag": player.bag.path, "played_to": stamp / NANOSECONDS}
+        self._diagnostics.publish(DiagnosticStatus.OK, message, values, stamp)
 
     def _on_answer(self, topic: str, data: bytes, _: Information) -> None:
         self.player.answer(topic, first_stamp(data))

@@ -131,6 +131,11 @@ class RecordingSession:
         self._lost = total
         return lost
 
+    @property
+    def lost(self) -> int:
+        """Messages lost so far."""
+        return sum(each.lost for each in self._losses.values())
+
     def is_quiet(self) -> bool:
         """Whether nothing was received since the last call; False at the first."""
         quiet, self._received = not self._received, False

@@ -44,7 +44,7 @@ class Surroundings(Protocol):
     def recorder_listens(self) -> bool:
         """Whether a recorder has subscribed to every topic of the run, and knows all parameters."""
 
-    def publishers(self, topic: str) -> list[str]:
+    def publishers_of(self, topic: str) -> list[str]:
         """Full names of the nodes that publish a topic, this one included."""
 
     def publish(self, topic: str, record: Any) -> None:
@@ -138,7 +138,7 @@ class PlantExecutive:
     def _rivals(self) -> Iterator[str]:
         """Who else publishes what the plant does, in words."""
         for topic in self._own:
-            publishers = self._around.publishers(topic)
+            publishers = self._around.publishers_of(topic)
             if len(publishers) > 1:
                 yield f"only one publisher of {topic}: {' and '.join(sorted(publishers))} are in this ROS domain"
 
@@ -146,7 +146,7 @@ class PlantExecutive:
         """Publish, once each, that more than one node does what one has to."""
         found = [f"needs {rivals}" for rivals in self._rivals()]
         for topic in (topics.PROGRESS.name, *self._commands):
-            publishers = self._around.publishers(topic)
+            publishers = self._around.publishers_of(topic)
             contradicts = self.simulation.barrier.contradictions[self._commands.get(topic, "")] >= CONTRADICTIONS
             if len(set(publishers)) > 1 or contradicts:
                 found.append(f"{topic} has several publishers: {' and '.join(sorted(publishers))}")

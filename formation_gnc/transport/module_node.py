@@ -6,15 +6,17 @@ from functools import partial
 from time import perf_counter, time_ns
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.service import Service
 
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import ModuleInstance, Row
 from formation_gnc.flight.synchronizer import HISTORY
 from formation_gnc.parameters import dump
-from formation_gnc.records import Event, EventKind, Timing
+from formation_gnc.records import WARNINGS, Event, EventKind, Timing
 from formation_gnc.transport.bus import IntraProcessBus
 from formation_gnc.transport.conversion import codec
+from formation_gnc.transport.diagnostics import PERIOD, DiagnosticsPublisher
 from formation_gnc.transport.node import ConfiguredNode
 from formation_gnc.transport.subscriptions import Information
 from formation_gnc.types import NANOSECONDS
@@ -65,6 +67,9 @@ class ModuleNode(ConfiguredNode):
         self._decoders: dict[str, Callable[[bytes], Any]] = {}
         for topic, record in {**self._instance.inputs, **self._instance.inputs_of_others}.items():
             self._subscribe_input(topic, record)
+        self._answered, self._warning = 0, ""
+        self._diagnostics = DiagnosticsPublisher(self, self.full_name(f"/{self._instance.deputy}"))
+        self.create_wall_timer(PERIOD, self._diagnose)
         self._designer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="design")
         for service in self.services:
             if service.srv_name.endswith(("/set_parameters", "/set_parameters_atomically")):
@@ -123,6 +128,7 @@ class ModuleNode(ConfiguredNode):
             return
         for name, output in self._instance.respond(inputs):
             self._publish[name](output)
+        self._answered += 1
         spent = perf_counter() - started
         self._bus.deliver()
         self._publish_timing(Timing(inputs[0].time, self._instance.row.name, round(spent * NANOSECONDS)))
@@ -132,8 +138,23 @@ class ModuleNode(ConfiguredNode):
         for event in self._instance.take_events():
             self.log_event(event)
             self._publish_event(event)
+            if event.kind in WARNINGS:
+                self._warning = str(event)
             if event.kind in (EventKind.PARAMETERS, EventKind.REJECTED):
                 self.show_parameters(dump(self._module.parameters))
+
+    def _diagnose(self) -> None:
+        """Publish whether it answers, and what has happened since it was last told."""
+        level, message = DiagnosticStatus.OK, "answering"
+        if not self._answered:
+            level, message = DiagnosticStatus.WARN, f"waiting for {' and '.join(self._instance.inputs)}"
+        elif self._module.waiting_for:
+            level, message = DiagnosticStatus.WARN, f"waiting for {self._module.waiting_for}"
+        elif self._warning:
+            level, message = DiagnosticStatus.WARN, self._warning
+        self._warning = ""
+        values = {"tick": self._module.time // self._module.parameters.tick_ns, "answered": self._answered}
+        self._diagnostics.publish(level, message, values, self._module.time)
 
     def stage_parameters(self, changes: Mapping[str, Any]) -> tuple[Any, Callable[[], None]]:
         """Design for a change; it takes effect at the next tick."""

@@ -24,7 +24,7 @@ except ImportError:  # missing in other builds of Jazzy; slower, same behaviour
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight.topics import QUEUE_DEPTH
 from formation_gnc.parameters import OWN_OF_ROS, Leaf, change, dump, leaves, load, read_yaml
-from formation_gnc.records import WARNINGS, Event
+from formation_gnc.records import WARNINGS, Event, EventKind
 from formation_gnc.transport.conversion import codec, message_type
 from formation_gnc.transport.parameter_arguments import given_parameters, without_parameters
 from formation_gnc.transport.process import stop_requested
@@ -167,7 +167,9 @@ class ConfiguredNode(Node):  # type: ignore[misc]
 
     def log_event(self, event: Event) -> None:
         """Log an event at the level of its kind; rclpy allows one level per line of code."""
-        if event.kind in WARNINGS:
+        if event.kind == EventKind.LOST:
+            self.get_logger().error(str(event))
+        elif event.kind in WARNINGS:
             self.get_logger().warning(str(event))
         else:
             self.get_logger().info(str(event))

@@ -94,6 +94,7 @@ class Bench:
             if isinstance(node, RecorderNode):
                 node.session.close()
             node.destroy_node()
+        self.executor.shutdown()
         self.user.destroy_node()
 
 
@@ -105,5 +106,7 @@ def bench(tmp_path: Path, flown: Path) -> Iterator[Bench]:
         try:
             yield bench
         finally:
-            bench.clear()
-            rclpy.shutdown()
+            try:
+                bench.clear()
+            finally:
+                rclpy.shutdown()

@@ -32,7 +32,7 @@ class Graph:
     def is_published(self, topic: str) -> bool:
         return topic in self.published
 
-    def publishers(self, topic: str) -> list[str]:
+    def publishers_of(self, topic: str) -> list[str]:
         return ["/plant", *self.others.get(topic, [])] if "deputy1/thrust" not in topic else self.others.get(topic, [])
 
     def has_recorder(self) -> bool:
