@@ -12,6 +12,8 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import Trigger
 
 from formation_gnc.flight import topics
+from formation_gnc.flight.graph import GRAPH
+from formation_gnc.recording.parameter_collection import PLANT
 from formation_gnc.recording.parameters import RecorderParameters
 from formation_gnc.recording.provenance import provenance
 from formation_gnc.recording.session import RecordingSession
@@ -56,7 +58,7 @@ class RecorderNode(ConfiguredNode):
         self.get_logger().info(f"recording to {directory}")
         self._diagnostics = DiagnosticsPublisher(self, self.full_name("") or "/")
         self.create_wall_timer(PERIOD, self._diagnose)
-        self._raw_topics = RawTopics(self, self._open)
+        self._raw_topics = RawTopics(self, self._open, self.full_name(""))
         self._reader = ParameterReader(self)
         if values.snapshot:
             self.create_service(Trigger, "~/snapshot", self._on_snapshot)
@@ -64,18 +66,42 @@ class RecorderNode(ConfiguredNode):
         self.create_wall_timer(FLUSH_INTERVAL, self.session.while_disk_lasts(self.session.bag.flush))
 
     def _open(self, topic: str, type_name: str, latched: bool) -> Callback:
-        return self.session.open_topic(topic, type_name, partial(self.count_publishers, topic), latched)
+        return self.session.open_topic(topic, type_name, partial(self.count_publishers, self.full_name(topic)), latched)
+
+    def _nodes_of_run(self, now: float) -> dict[str, str]:
+        """Full names of the nodes with parameters, by their names within the formation.
+
+        A node of the run counts by what it publishes, whatever its name.
+        """
+        formation, known = self.full_name("/"), self._reader.nodes()
+        nodes = {f"/{each.removeprefix(formation)}": each for each in known if each.startswith(formation)}
+        deputies = self.session.parameters.values.get(PLANT, {}).get("deputies", ())
+        roles = {PLANT: topics.TRUTH.name}
+        roles |= {f"/{deputy}/{row.name}": row.answer.of(deputy) for deputy in deputies for row in GRAPH}
+        for role, topic in roles.items():
+            if role in nodes:
+                continue
+            for offer in self.get_publishers_info_by_topic(self.full_name(topic)):
+                full_name = f"{offer.node_namespace.rstrip('/')}/{offer.node_name}"
+                if full_name in known:
+                    nodes[role] = full_name
+                else:
+                    self.session.parameters.offers_none(role, now)
+        return nodes
 
     def _look(self) -> None:
         session, now = self.session, monotonic()
         self._raw_topics.look()
-        session.parameters.appeared(self._reader.nodes())
+        nodes = self._nodes_of_run(now)
+        session.parameters.appeared(nodes)
         for node, record in session.parameters.due(now).items():
-            left_out = ("bag",) if node == self.get_fully_qualified_name() else ()  # where, not how, it was recorded
+            if node not in nodes:
+                continue
+            left_out = ("bag",) if nodes[node] == self.get_fully_qualified_name() else ()  # where, not how
             take = session.while_disk_lasts(partial(session.put_on_record, node, record, left_out=left_out))
-            if self._reader.ask(node, take):
+            if self._reader.ask(nodes[node], take):
                 session.parameters.asked(node, now)
-        if session.parameters.is_complete:
+        if session.parameters.is_complete(now):
             session.report_progress()
         if lost := session.new_losses():
             self.get_logger().warning(f"lost so far: {', '.join(f'{n} of {topic}' for topic, n in lost.items())}")

@@ -22,19 +22,24 @@ Callback = Callable[[bytes, int, int | None], None]
 class RawTopics:
     """Subscriptions of a node to every topic that there is, those that appear later too.
 
+    In a formation, topics have their names within it, and those of other formations are left out.
+
     Messages are stamped with simulated time: their own header's if they begin with one, the latest tick's
     otherwise.
     """
 
-    def __init__(self, node: Node, open_topic: Callable[[str, str, bool], Callback]) -> None:
+    def __init__(
+        self, node: Node, open_topic: Callable[[str, str, bool], Callback], formation: str | None = None
+    ) -> None:
         """Subscribe to nothing yet.
 
         Args:
             node: the one who subscribes.
             open_topic: given a topic, its type and whether late subscribers get what was said before,
                 returns who takes its messages; raises ConfigurationError for a type that is not installed.
+            formation: namespace of the formation; None for all topics, by their full names.
         """
-        self._node, self._open = node, open_topic
+        self._node, self._open, self._formation = node, open_topic, formation
         self._known: set[str] = set()
         self._unheard: set[str] = set()
         self._receivers: dict[str, tuple[Any, Callable[..., None]]] = {}
@@ -55,10 +60,13 @@ class RawTopics:
                     self._node.get_logger().warning(f"{topic} is not heard: {error}")
 
     def _subscribe(self, topic: str, type_name: str) -> None:
+        name = self._name_of(topic, type_name)
+        if name is None:
+            return
         kind = message_class(type_name)
         qos = self._offered(topic)
-        take = self._open(topic, type_name, qos.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL)
-        is_clock = topic == topics.CLOCK.name
+        take = self._open(name, type_name, qos.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL)
+        is_clock = name == topics.CLOCK.name
         stamped = is_clock or "std_msgs/Header" in list(kind.get_fields_and_field_types().values())[:1]
 
         def receive(data: bytes, about: dict[str, Any]) -> None:
@@ -71,6 +79,13 @@ class RawTopics:
 
         self._receivers[topic] = (kind, with_information(receive))
         self._subscribe_to_offers(topic)
+
+    def _name_of(self, topic: str, type_name: str) -> str | None:
+        """Name of a topic within the formation; None for one of another."""
+        formation = None if self._formation is None else topics.formation_of(topic, type_name)
+        if formation is None:
+            return topic
+        return topic.removeprefix(formation) if formation == self._formation else None
 
     def _offered(self, topic: str) -> QoSProfile:
         """The most demanding quality of service that hears every writer there is."""
