@@ -52,7 +52,7 @@ DIAGNOSTICS = Topic(
     "/diagnostics",
     None,
     "twice a second of wall time",
-    "state of the run from the plant: what it waits for, tick, misses, speed",
+    "state of the run from the plant: what it waits for, tick, misses, speed; state of every node",
     "diagnostic_msgs/DiagnosticArray",
     every_tick=False,
 )

@@ -59,7 +59,7 @@ class ModuleNode(ConfiguredNode):
             topic.of(self._instance.deputy): self._published(topic) for topic in self._instance.published()
         }
         self._publish_event = self.publisher_of(Event, topics.EVENTS.name)
-        self._publish_timing = self.publisher_of(Timing, topics.TIMING.name)
+        self._publish_timing = self.publisher_of(Timing, topics.TIMING.of(self._instance.deputy))
         self._started = time_ns()
         self._waiting: dict[str, list[tuple[int, bytes]]] = {}
         self._catch_up_soon = self.create_wall_timer(SETTLING, self._catch_up)

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -92,7 +93,8 @@ class Bench:
     def clear(self) -> None:
         for node in self.nodes:
             if isinstance(node, RecorderNode):
-                node.session.close()
+                with suppress(ValueError):  # closed already
+                    node.session.close()
             node.destroy_node()
         self.executor.shutdown()
         self.user.destroy_node()
