@@ -9,9 +9,9 @@ from pathlib import Path
 
 import yaml
 from ament_index_python.packages import get_package_share_directory
-from launch.actions import DeclareLaunchArgument, GroupAction, OpaqueFunction, Shutdown
+from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
 from launch.substitutions import LaunchConfiguration
-from launch_ros.actions import Node, PushRosNamespace
+from launch_ros.actions import Node
 
 from formation_gnc.flight.graph import MODULES
 from launch import LaunchContext, LaunchDescription
@@ -21,8 +21,9 @@ ARGUMENTS = {
     "params_file": ("", "parameter file whose values go over the scenario's"),
     "namespace": ("", "namespace of the formation"),
     "use_sim_time": ("false", "whether the nodes' ROS clocks follow /clock; what they wait for is on a steady clock"),
-    "log_level": ("info", "least level of what is logged"),
+    "log_level": ("", "least level of what is logged: debug, info, warn, error or fatal"),
     "use_composition": ("false", "one process for each satellite, not one for each of its nodes"),
+    "composed": ("", "former name of use_composition"),
     "use_respawn": ("false", "start a deputy's node again when it has died"),
     "bag": ("", "directory to make for the bag; empty for bags/ and the date and time"),
     "record": ("true", "whether to record"),
@@ -44,7 +45,7 @@ def generate_launch_description() -> LaunchDescription:
                     name,
                     default_value=default,
                     description=meaning,
-                    choices=["true", "false"] if name in SWITCHES else None,
+                    **({"choices": ["true", "false"]} if name in SWITCHES else {}),
                 )
                 for name, (default, meaning) in ARGUMENTS.items()
             ),
@@ -53,29 +54,31 @@ def generate_launch_description() -> LaunchDescription:
     )
 
 
-def nodes(context: LaunchContext) -> list[GroupAction]:
+def nodes(context: LaunchContext) -> list[Node]:
     given = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
-    is_on = {name: given[name] == "true" for name in SWITCHES}
+    is_on = {name: given[name] == "true" for name in (*SWITCHES, "composed")}
     path = Path(given["scenario"])
     if not path.suffix:
         path = Path(get_package_share_directory("formation_gnc"), "params", f"{given['scenario']}.yaml")
     files = [str(path), *([given["params_file"]] if given["params_file"] else [])]
+    for_all = ["--log-level", given["log_level"]] if given["log_level"] else []
+    for_all += ["-p", "use_sim_time:=true"] if is_on["use_sim_time"] else []
 
-    def node(executable: str, namespace: str = "", own: dict[str, object] | None = None, **options: object) -> Node:
+    def node(executable: str, deputy: str = "", own: dict[str, str] | None = None, **options: object) -> Node:
+        values = [f"{name}:={value}" for name, value in (own or {}).items() if value]
         return Node(
             package="formation_gnc",
             executable=executable,
-            namespace=namespace,
-            parameters=[*files, {"use_sim_time": is_on["use_sim_time"], **(own or {})}],
-            arguments=["--ros-args", "--log-level", given["log_level"]],
+            namespace="/".join(filter(None, (given["namespace"], deputy))),
+            parameters=files,
+            ros_arguments=[*for_all, *(word for value in values for word in ("-p", value))],
             output="screen",
             **options,
         )
 
-    plant: dict[str, object] = {"wait_for_recorder": is_on["record"]}
-    plant |= {"seed": int(given["seed"])} if given["seed"] else {}
-    plant |= {"duration": float(given["duration"])} if given["duration"] else {}
-    law = {"algorithm": given["controller"]} if given["controller"] else {}
+    plant = {"wait_for_recorder": given["record"], "seed": given["seed"]}
+    plant["duration"] = str(float(given["duration"])) if given["duration"] else ""
+    law = {"algorithm": given["controller"]}
     again = {"respawn": is_on["use_respawn"], "respawn_delay": 1.0}
     started = [node("plant", own=plant, on_exit=Shutdown(reason="the flight is over"))]
     if is_on["record"]:
@@ -83,11 +86,11 @@ def nodes(context: LaunchContext) -> list[GroupAction]:
     if is_on["display"]:
         started.append(node("display"))
     for deputy in deputies(files):
-        if is_on["use_composition"]:
+        if is_on["use_composition"] or is_on["composed"]:
             started.append(node("satellite", deputy, law, **again))
         else:
             started += [node(name, deputy, law if name == "controller" else {}, **again) for name in MODULES]
-    return [GroupAction([PushRosNamespace(given["namespace"]), *started])]
+    return started
 
 
 def deputies(files: list[str]) -> list[str]:
