@@ -134,7 +134,7 @@ class ConfiguredNode(Node):  # type: ignore[misc]
         return value
 
     def _has(self, name: str, value: Any) -> bool:
-        return self.has_parameter(name) and self.get_parameter(name).value == value
+        return bool(self.has_parameter(name) and self.get_parameter(name).value == value)
 
     def _set_those_of_ros(self, values: Mapping[str, Any]) -> None:
         """Set parameters that rclpy declares by itself."""
