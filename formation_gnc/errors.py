@@ -1,5 +1,15 @@
 """Errors that a user can act on: each message names the thing, the value and what is allowed."""
 
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Hint for an unknown name: the nearest of the known ones, or all of them."""
+    known = sorted(known)
+    near = get_close_matches(name, known, n=1)
+    return f"did you mean {near[0]}?" if near else f"known: {', '.join(known)}"
+
 
 class ConfigurationError(ValueError):
     """A value that is not allowed; base of the errors of set-up.

@@ -8,7 +8,6 @@ made with :func:`per_name` holds one nested schema for every name that another f
 """
 
 import dataclasses
-import difflib
 import json
 import math
 import re
@@ -18,7 +17,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 import yaml
 
-from formation_gnc.errors import ParameterError
+from formation_gnc.errors import ParameterError, nearest
 
 OWN_OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides")
 """Prefixes of parameters that every ROS node may have besides its schema."""
@@ -218,9 +217,7 @@ def load[T](schema: type[T], values: Mapping[str, Any]) -> T:
     known = {leaf.name: leaf for leaf in leaves(schema, values)}
     for name in values:
         if name not in known:
-            near = difflib.get_close_matches(name, known, n=1)
-            hint = f"did you mean {near[0]}?" if near else "known: " + ", ".join(sorted(known))
-            raise ParameterError(f"parameter {name}: unknown; {hint}")
+            raise ParameterError(f"parameter {name}: unknown; {nearest(name, known)}")
     checked = {}
     for leaf in known.values():
         if leaf.name in values:

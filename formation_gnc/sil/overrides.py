@@ -1,12 +1,11 @@
 """Parameters given beside a scenario: `NODE.PARAMETER=VALUE`, the value as in a parameter file."""
 
-import difflib
 from collections.abc import Iterable
 from typing import Any
 
 import yaml
 
-from formation_gnc.errors import ConfigurationError
+from formation_gnc.errors import ConfigurationError, nearest
 from formation_gnc.flight.graph import MODULES
 from formation_gnc.parameters import read_yaml
 
@@ -50,9 +49,7 @@ def _pattern(node: str, entry: str) -> str:
     deputy, slash, module = node.rpartition("/")
     known = MODULES if slash else ("plant", *MODULES)
     if module not in known:
-        near = difflib.get_close_matches(module, known, n=1)
-        hint = f"did you mean {near[0]}?" if near else f"it must be one of {', '.join(known)}"
-        raise ConfigurationError(f"set {entry!r}: node {node} is unknown; {hint}")
+        raise ConfigurationError(f"set {entry!r}: node {node} is unknown; {nearest(module, known)}")
     if module == "plant":
         return "/plant"
     return f"/{deputy}/{module}" if slash else f"/**/{module}"

@@ -1,6 +1,5 @@
 """Sets parameters of a running node through the standard services."""
 
-import difflib
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,20 +11,20 @@ from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.task import Future
 
-from formation_gnc.errors import ConfigurationError
-from formation_gnc.transport.parameter_reader import ParameterReader
+from formation_gnc.errors import ConfigurationError, nearest
 
-DISCOVERY = 10.0
+PATIENCE = 10.0
 """Wall time (s) that a node has to be discovered, and to answer."""
 
 
-def set_parameters(name: str, values: Mapping[str, Any], domain: int | None = None) -> None:
+def set_parameters(name: str, values: Mapping[str, Any], domain: int | None = None, patience: float = PATIENCE) -> None:
     """Set parameters of a node, all or none.
 
     Args:
         name: full name of the node.
         values: by parameter; a whole number is a double where the parameter is one.
         domain: of ROS; None for that of the environment.
+        patience: wall time (s) that the node has to be discovered, and for each answer.
 
     Raises:
         ConfigurationError: no such node, a value of another type, or the node rejects the change.
@@ -37,21 +36,21 @@ def set_parameters(name: str, values: Mapping[str, Any], domain: int | None = No
     executor.add_node(node)
 
     def wait(answer: Future) -> Any:
-        executor.spin_until_future_complete(answer, timeout_sec=DISCOVERY)
+        executor.spin_until_future_complete(answer, timeout_sec=patience)
         if not answer.done():
-            raise ConfigurationError(f"node {name}: does not answer within {DISCOVERY:g} s")
+            raise ConfigurationError(f"node {name}: does not answer within {patience:g} s")
         return answer.result()
 
     try:
         client = AsyncParameterClient(node, name)
-        if not client.wait_for_services(timeout_sec=DISCOVERY):
+        if not client.wait_for_services(timeout_sec=patience):
             raise ConfigurationError(f"node {name}: not in this ROS domain; {_hint(node, name)}")
         types = wait(client.get_parameter_types(list(values))).types
-        parameters = [
-            _parameter(each, Parameter.Type(kind), values[each]) for each, kind in zip(values, types, strict=False)
-        ]
-        if len(parameters) < len(values):  # ROS leaves the types out when one name is unknown
-            parameters = [Parameter(each, value=value) for each, value in values.items()]
+        if len(types) < len(values):  # ROS leaves the types out when one name is unknown
+            known = wait(client.list_parameters()).result.names
+            unknown = next(each for each in values if each not in known)
+            raise ConfigurationError(f"node {name}: parameter {unknown}: unknown; {nearest(unknown, known)}")
+        parameters = [_parameter(*item, Parameter.Type(kind)) for item, kind in zip(values.items(), types, strict=True)]
         result = wait(client.set_parameters_atomically(parameters)).result
         if not result.successful:
             raise ConfigurationError(f"node {name}: {result.reason}")
@@ -61,7 +60,8 @@ def set_parameters(name: str, values: Mapping[str, Any], domain: int | None = No
 
 
 def _parameter(name: str, value: Any, kind: Parameter.Type) -> Parameter:
-    if kind == Parameter.Type.NOT_SET:
+    # rclpy takes an empty array for one of bytes.
+    if kind in (Parameter.Type.NOT_SET, Parameter.Type.BYTE_ARRAY):
         return Parameter(name, value=value)
     if kind == Parameter.Type.DOUBLE and isinstance(value, int) and not isinstance(value, bool):
         value = float(value)
@@ -76,8 +76,6 @@ def _parameter(name: str, value: Any, kind: Parameter.Type) -> Parameter:
 
 def _hint(node: Node, name: str) -> str:
     """The nearest name of a node that is there, or all of them."""
-    known = sorted(ParameterReader(node).nodes())
-    near = difflib.get_close_matches(name, known, n=1)
-    if near:
-        return f"did you mean {near[0]}?"
-    return f"it has {', '.join(known)}" if known else "it has no node with parameters; set ROS_DOMAIN_ID to the run's"
+    names = (f"{namespace.rstrip('/')}/{each}" for each, namespace in node.get_node_names_and_namespaces())
+    known = sorted({*names} - {node.get_fully_qualified_name()})
+    return nearest(name, known) if known else "it has no node; set ROS_DOMAIN_ID to that of the run"

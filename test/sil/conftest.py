@@ -28,6 +28,7 @@ GNC_TOPICS = (
 )
 PARTS = tuple(MODULES)
 PATIENCE = 90.0  # s of wall time, for a machine that is busy with other things
+DEADLINE = 60.0  # s of wall time for an answer, on such a machine; a test of misses has its own
 
 resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # what is aborted to hear where it was leaves nothing else
 
@@ -51,7 +52,7 @@ def has_messages(bag: Path, topic: str) -> bool:
 def set_parameter(domain: int, node: str, name: str, value: Any) -> tuple[bool, str]:
     """Set a parameter as `formation-gnc set` does: whether it was accepted, and if not, why."""
     try:
-        set_parameters(node, {name: value}, domain)
+        set_parameters(node, {name: value}, domain, PATIENCE)
     except ConfigurationError as rejection:
         return False, str(rejection)
     return True, ""
@@ -97,6 +98,8 @@ class Desk:
 
     def start(self, kind: str, **parameters: object) -> Terminal:
         arguments = ["--params-file", str(self.parameters)]
+        if kind == "plant":
+            parameters = {"deadline": DEADLINE, **parameters}
         for name, value in parameters.items():
             arguments += ["-p", f"{name}:={str(value).lower() if isinstance(value, bool) else value}"]
         terminal = Terminal(kind, arguments, self.environment, self.directory)
@@ -141,7 +144,16 @@ class Sil:
     def __init__(self, directory: Path, scenario: str, *arguments: str) -> None:
         self.bag = directory / "bag"
         self.process = subprocess.Popen(
-            ["formation-gnc", "sil", scenario, "--bag", str(self.bag), *arguments],
+            [
+                "formation-gnc",
+                "sil",
+                scenario,
+                "--bag",
+                str(self.bag),
+                "--set",
+                f"plant.deadline={DEADLINE}",
+                *arguments,
+            ],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

@@ -17,7 +17,7 @@ from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import find_scenario, load_scenario
 from formation_gnc.transport.launcher import LaunchOptions, fly_graph
 
-from .conftest import Sil, set_parameter
+from .conftest import DEADLINE, Sil, set_parameter
 
 CHANGE = 8890
 
@@ -105,7 +105,11 @@ def test_fleet_commanded_in_flight_changes_formation_at_one_tick(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     guidance = {"assignment": "delta_v", "schedule": [], "reconfiguration_time": 3000.0}
-    paced = {"duration": 600.0, "real_time_factor": 20.0}  # half a minute of wall time to set all schedules
+    paced = {
+        "duration": 600.0,
+        "real_time_factor": 20.0,  # half a minute of wall time to set all schedules
+        "deadline": DEADLINE,
+    }
     scenario = load_scenario("tetrahedral", {"/plant": paced, "/**/guidance": guidance})
     at = 500
     order = [f"{{at: {at}.0, formation: three_in_plane_one_out}}"]

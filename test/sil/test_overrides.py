@@ -31,7 +31,7 @@ def test_the_later_of_two_values_counts() -> None:
         ("algorithm=mpc", "set 'algorithm=mpc': is not allowed; it must be like NODE.PARAMETER=VALUE"),
         ("controller.algorithm", "must be like NODE.PARAMETER=VALUE"),
         ("controler.algorithm=mpc", "node controler is unknown; did you mean controller?"),
-        ("deputy1/plant.seed=1", "node deputy1/plant is unknown; it must be one of navigation, guidance, controller"),
+        ("deputy1/plant.seed=1", "node deputy1/plant is unknown; known: controller, guidance, navigation"),
         ("controller.algorithm=", "parameter algorithm: '' is not allowed; it must be a value or a list of them"),
         ("controller.lqr={thrust: 1.0}", "parameter lqr: '{thrust: 1.0}' is not allowed"),
         ("controller.algorithm=[mpc", "parameter algorithm: '[mpc' is not YAML"),
