@@ -119,16 +119,17 @@ class Leaf:
         return scalar[self.type]
 
     def check(self, value: Any) -> Any:
-        """`value` in the parameter's type.
+        """`value` in the parameter's type; arrays and scalars of NumPy and of ROS count as lists and numbers.
 
         Raises:
             ParameterError: the value is not allowed.
         """
+        value = _plain(value)
         if get_origin(self.type) is not tuple:
             return self._check_scalar(value, self.type)
         if not _is_list(value):
             raise self._rejection(value, f"a list ({self.type_name})")
-        values = tuple(self._check_scalar(item, get_args(self.type)[0]) for item in value)
+        values = tuple(self._check_scalar(_plain(item), get_args(self.type)[0]) for item in value)
         if self.limits.length is not None and len(values) != self.limits.length:
             raise self._rejection(list(value), self.limits.allowed())
         return values
@@ -151,6 +152,11 @@ class Leaf:
 
     def _rejection(self, value: Any, allowed: str) -> ParameterError:
         return ParameterError(f"parameter {self.name}: {value!r} is not allowed; it must be {allowed}")
+
+
+def _plain(value: Any) -> Any:
+    """Arrays and scalars of NumPy and of ROS as lists and numbers of Python."""
+    return value.tolist() if hasattr(value, "tolist") else value
 
 
 def _is_list(value: Any) -> bool:
@@ -219,8 +225,8 @@ def load[T](schema: type[T], values: Mapping[str, Any]) -> T:
 
 
 def to_json(value: Any) -> str:
-    """A parameter's value as JSON; tuples and numeric arrays, also of ROS and NumPy, become lists."""
-    return json.dumps(value, default=lambda array: array.tolist())
+    """A parameter's value as JSON; tuples, numeric arrays of ROS and NumPy, and bytes become lists of numbers."""
+    return json.dumps(value, default=lambda each: int.from_bytes(each) if isinstance(each, bytes) else _plain(each))
 
 
 def _build[T](schema: type[T], checked: Mapping[str, Any], prefix: str) -> T:
@@ -266,3 +272,9 @@ def change[T](instance: T, changes: Mapping[str, Any]) -> T:
         if leaf.check(changes[leaf.name]) != values.get(leaf.name, leaf.default):
             raise ParameterError(f"parameter {leaf.name}: cannot change in flight; set it at the start")
     return load(type(instance), values | dict(changes))
+
+
+def differences(before: Any, after: Any) -> dict[str, Any]:
+    """Values of `after` by dotted name where they differ from those of `before`."""
+    old = dump(before)
+    return {name: value for name, value in dump(after).items() if name not in old or old[name] != value}

@@ -1,6 +1,8 @@
 """Fly a scenario, all its deputies, and record it.
 
-`ros2 launch formation_gnc sil.launch.py scenario:=tetrahedral composed:=true`
+`ros2 launch formation_gnc sil.launch.py scenario:=tetrahedral use_composition:=true bag:=bags/fleet`
+
+It can be included, below a namespace too: each namespace is a formation of its own, with a `/clock` of its own.
 """
 
 from pathlib import Path
@@ -14,20 +16,38 @@ from launch_ros.actions import Node
 from formation_gnc.flight.graph import MODULES
 from launch import LaunchContext, LaunchDescription
 
+ARGUMENTS = {
+    "scenario": ("leader_follower", "name of a scenario, or path of a parameter file"),
+    "params_file": ("", "parameter file whose values go over the scenario's"),
+    "namespace": ("", "namespace of the formation"),
+    "use_sim_time": ("false", "whether the nodes' ROS clocks follow /clock; what they wait for is on a steady clock"),
+    "log_level": ("", "least level of what is logged: debug, info, warn, error or fatal"),
+    "use_composition": ("false", "one process for each satellite, not one for each of its nodes"),
+    "composed": ("", "former name of use_composition"),
+    "use_respawn": ("false", "start a deputy's node again when it has died"),
+    "bag": ("", "directory to make for the bag; empty for bags/ and the date and time"),
+    "record": ("true", "whether to record"),
+    "seed": ("", "seed of the run; empty for the scenario's"),
+    "duration": ("", "simulated time to fly, s; empty for the scenario's"),
+    "controller": ("", "control law of every deputy; empty for the scenario's"),
+    "display": ("false", "markers and transforms for RViz and Foxglove"),
+}
+"""Default and meaning of each argument."""
+
+SWITCHES = ("use_sim_time", "use_composition", "use_respawn", "record", "display")
+
 
 def generate_launch_description() -> LaunchDescription:
     return LaunchDescription(
         [
-            DeclareLaunchArgument(
-                "scenario",
-                default_value="leader_follower",
-                description="name of a scenario, or path of a parameter file",
-            ),
-            DeclareLaunchArgument(
-                "composed",
-                default_value="false",
-                choices=["true", "false"],
-                description="one process for each satellite, not one for each of its nodes",
+            *(
+                DeclareLaunchArgument(
+                    name,
+                    default_value=default,
+                    description=meaning,
+                    **({"choices": ["true", "false"]} if name in SWITCHES else {}),
+                )
+                for name, (default, meaning) in ARGUMENTS.items()
             ),
             OpaqueFunction(function=nodes),
         ]
@@ -35,28 +55,49 @@ def generate_launch_description() -> LaunchDescription:
 
 
 def nodes(context: LaunchContext) -> list[Node]:
-    scenario, composed = (LaunchConfiguration(name).perform(context) for name in ("scenario", "composed"))
-    path = Path(scenario)
+    given = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
+    is_on = {name: given[name] == "true" for name in (*SWITCHES, "composed")}
+    path = Path(given["scenario"])
     if not path.suffix:
-        path = Path(get_package_share_directory("formation_gnc"), "params", f"{scenario}.yaml")
-    plant = yaml.safe_load(path.read_text())["/plant"]["ros__parameters"]
+        path = Path(get_package_share_directory("formation_gnc"), "params", f"{given['scenario']}.yaml")
+    files = [str(path), *([given["params_file"]] if given["params_file"] else [])]
+    for_all = ["--log-level", given["log_level"]] if given["log_level"] else []
+    for_all += ["-p", "use_sim_time:=true"] if is_on["use_sim_time"] else []
 
-    def node(executable: str, namespace: str = "", **options: object) -> Node:
+    def node(executable: str, deputy: str = "", own: dict[str, str] | None = None, **options: object) -> Node:
+        values = [f"{name}:={value}" for name, value in (own or {}).items() if value]
         return Node(
             package="formation_gnc",
             executable=executable,
-            namespace=namespace,
-            parameters=[str(path)],
+            namespace="/".join(filter(None, (given["namespace"], deputy))),
+            parameters=files,
+            ros_arguments=[*for_all, *(word for value in values for word in ("-p", value))],
             output="screen",
             **options,
         )
 
-    return [
-        node("plant", on_exit=Shutdown(reason="the flight is over")),
-        node("recorder"),
-        *(
-            node(executable, namespace)
-            for namespace in plant.get("deputies", ["deputy1"])
-            for executable in (["satellite"] if composed == "true" else MODULES)
-        ),
-    ]
+    plant = {"wait_for_recorder": given["record"], "seed": given["seed"]}
+    plant["duration"] = str(float(given["duration"])) if given["duration"] else ""
+    law = {"algorithm": given["controller"]}
+    again = {"respawn": is_on["use_respawn"], "respawn_delay": 1.0}
+    started = [node("plant", own=plant, on_exit=Shutdown(reason="the flight is over"))]
+    if is_on["record"]:
+        started.append(node("recorder", own={"bag": given["bag"]}))
+    if is_on["display"]:
+        started.append(node("display"))
+    for deputy in deputies(files):
+        if is_on["use_composition"] or is_on["composed"]:
+            started.append(node("satellite", deputy, law, **again))
+        else:
+            started += [node(name, deputy, law if name == "controller" else {}, **again) for name in MODULES]
+    return started
+
+
+def deputies(files: list[str]) -> list[str]:
+    """Names of the deputies that parameter files give the plant."""
+    names = ["deputy1"]
+    for file in files:
+        sections = yaml.safe_load(Path(file).read_text()) or {}
+        for pattern in ("/**", "plant", "/plant", "/**/plant"):
+            names = sections.get(pattern, {}).get("ros__parameters", {}).get("deputies", names)
+    return names

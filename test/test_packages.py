@@ -300,7 +300,7 @@ def launch_double(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
 @pytest.mark.parametrize("composed", ["false", "true"])
 @pytest.mark.parametrize("scenario", sorted(path.stem for path in (ROOT / "params").glob("*.yaml")))
 def test_the_launch_file_starts_all_deputies_of_any_scenario(launch_double, scenario, composed):
-    nodes = started(launch_double, scenario=scenario, composed=composed)
+    nodes = started(launch_double, scenario=scenario, use_composition=composed)
     deputies = load_scenario(scenario).plant.deputies
     parts = {"satellite"} if composed == "true" else {"navigation", "guidance", "controller"}
     assert {(node.namespace, node.executable) for node in nodes} == {
@@ -320,6 +320,21 @@ def test_launch_file_takes_a_path_and_defaults_to_leader_follower(launch_double,
     nodes = started(launch_double, scenario=str(path))
     assert {node.namespace for node in nodes} == {"", "deputy1"}
     assert nodes[0].parameters == [str(path)]
+
+
+def test_launch_arguments_reach_the_nodes_that_they_are_for(launch_double):
+    given = {"seed": "7", "duration": "90", "controller": "mpc", "bag": "bags/x", "use_sim_time": "true"}
+    nodes = started(launch_double, namespace="alpha", display="true", use_respawn="true", log_level="warn", **given)
+    words = {node.executable: " ".join(node.ros_arguments) for node in nodes}
+    assert set(words) == NODES | {"display"}
+    for each in words.values():
+        assert each.startswith("--log-level warn -p use_sim_time:=true")
+    assert words["plant"].endswith("-p wait_for_recorder:=true -p seed:=7 -p duration:=90.0")
+    assert words["recorder"].endswith("-p bag:=bags/x")
+    assert words["controller"].endswith("-p algorithm:=mpc")
+    assert [name for name, each in words.items() if "mpc" in each] == ["controller"]
+    assert {node.namespace for node in nodes} == {"alpha", "alpha/deputy1"}
+    assert {node.executable for node in nodes if getattr(node, "respawn", False)} == NODES - {"plant", "recorder"}
 
 
 @needs_set_up

@@ -1,9 +1,12 @@
 """The tick barrier: when a tick is over, who is awaited, who missed it."""
 
+from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from typing import Any
+
+import numpy as np
 
 LONGEST_CHECK_GAP = 0.5
 """Wall time (s) between two checks beyond which the barrier itself has been held up."""
@@ -51,11 +54,14 @@ class TickBarrier:
     recorded: int | None = None
     """Stamp (ns) up to which the recorder has everything; None before it has said so."""
     has_recorder: bool = False
+    contradictions: Counter[str] = field(default_factory=Counter)
+    """By deputy, ticks to which it has given two different answers."""
 
     def __post_init__(self) -> None:
         """No tick is open."""
         self._awaited: set[str] = set()
         self._known: set[str] = set()
+        self._before: tuple[int, dict[str, Any]] = (-1, {})
         self._opened = self._started = self._checked = 0.0
         self._ticks = 0
 
@@ -64,6 +70,7 @@ class TickBarrier:
         if self._ticks == 0:
             self._started = self._checked = now
         self._ticks += 1
+        self._before = self.stamp, self.answers
         self.stamp, self._opened = stamp, now
         self.answers = {}
         self._awaited = set(self.deputies)
@@ -71,11 +78,17 @@ class TickBarrier:
     def answer(self, deputy: str, stamp: int, answer: Any) -> bool:
         """Take an answer; returns whether it counts: of the tick in flight, from who is awaited."""
         if stamp != self.stamp or deputy not in self._awaited:
+            self._note_contradiction(deputy, stamp, answer)
             return False
         self._awaited.discard(deputy)
         self._known.add(deputy)
         self.answers[deputy] = answer
         return True
+
+    def _note_contradiction(self, deputy: str, stamp: int, answer: Any) -> None:
+        answers = {self.stamp: self.answers, self._before[0]: self._before[1]}.get(stamp, {})
+        if deputy in answers and not np.array_equal(answers[deputy], answer, equal_nan=True):
+            self.contradictions[deputy] += 1
 
     def check(self, now: float) -> None:
         """Apply the deadline; called regularly.

@@ -3,14 +3,14 @@
 import math
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from formation_gnc.common import CommonParameters
 from formation_gnc.errors import ConfigurationError, ParameterError
 from formation_gnc.flight.schedule import parse_schedule
-from formation_gnc.parameters import change, dump, parameter, to_json
+from formation_gnc.parameters import change, differences, dump, parameter, to_json
 from formation_gnc.records import Event, EventKind, ParameterChange
 from formation_gnc.types import NANOSECONDS
 
@@ -100,6 +100,15 @@ class FlightModule[P: ModuleParameters, D](ABC):
     def check_plan(self, start: Configuration[P, D], plan: Plan[P, D]) -> None:  # noqa: B027 - optional
         """Raise ConfigurationError for scheduled changes that may not follow one another, or `start`."""
 
+    def first_of(self, waiting: Sequence[Any]) -> Any:
+        """Where to go on among inputs that wait: by default with the last, since the others are too late."""
+        return waiting[-1]
+
+    @property
+    def waiting_for(self) -> str:
+        """What it lacks to answer, in words; empty for nothing."""
+        return ""
+
     @property
     def parameters(self) -> P:
         """The parameters in force."""
@@ -120,17 +129,24 @@ class FlightModule[P: ModuleParameters, D](ABC):
     def stage(self, changes: Mapping[str, Any]) -> Configuration[P, D]:
         """Validate a change of parameters and design for it, without effect yet.
 
+        A change to the values that hold, or wait to, is no change: nothing is designed, and `commit` does nothing.
+
         Raises:
             ConfigurationError: the change is not allowed, or the design fails; nothing has changed.
         """
         waiting = tuple(self._committed)
-        staged = self.derive(self.parameters, {**waiting[-1].changes, **changes} if waiting else changes)
+        latest = waiting[-1] if waiting else self.configuration
+        effective = differences(latest.parameters, change(latest.parameters, changes))
+        if not effective:
+            return replace(latest, changes={}, plan=())
+        staged = self.derive(self.parameters, {**waiting[-1].changes, **effective} if waiting else effective)
         self.check_staged(staged)
         return staged
 
     def commit(self, staged: Configuration[P, D]) -> None:
         """Queue a staged configuration, to take effect when the next tick begins."""
-        self._committed.append(staged)
+        if staged.changes:
+            self._committed.append(staged)
 
     def begin_tick(self, time: int) -> None:
         """Make the changes due at `time` (ns): scheduled ones, then committed ones.
@@ -215,11 +231,13 @@ class FlightModule[P: ModuleParameters, D](ABC):
         return plan
 
     def _apply(self, time: int, due: Configuration[P, D]) -> bool:
-        """Make a change at a tick, or log its rejection; returns whether it was made."""
+        """Make a change at a tick, or log its rejection; returns whether its values hold."""
         try:
+            changed = change(self.parameters, due.changes)
+            if changed == self.parameters:
+                return True
             self.check_due(time, due)
             # The design made in advance holds only if nothing else has changed since.
-            changed = change(self.parameters, due.changes)
             if changed != due.parameters or any(at <= time for at, _ in due.plan):
                 due = self.derive(self.parameters, due.changes)
         except ConfigurationError as rejection:
@@ -233,9 +251,9 @@ class FlightModule[P: ModuleParameters, D](ABC):
         if "schedule" in new.changes:
             self.pending = new.plan
         self.activate(old, new)
-        before, after = dump(old.parameters), dump(new.parameters)
-        changes = [ParameterChange(name, to_json(before[name]), to_json(after[name])) for name in new.changes]
-        detail = ", ".join(f"{name}: {_text(before[name])} -> {_text(after[name])}" for name in new.changes)
+        before, after = dump(old.parameters), differences(old.parameters, new.parameters)
+        changes = [ParameterChange(name, to_json(before[name]), to_json(value)) for name, value in after.items()]
+        detail = ", ".join(f"{name}: {_text(before[name])} -> {_text(value)}" for name, value in after.items())
         self.log(time, EventKind.PARAMETERS, detail, changes=changes)
 
 

@@ -38,10 +38,14 @@ class StampSynchronizer:
     def take(self, topic: str, record: Stamped) -> list[Any] | None:
         """Add a record; once per stamp returns the records of all topics, each of its topic's own type.
 
+        A stamp before 0 is of no run, and ignored.
+
         Returns:
             In the order of topics, None for a missing one; None in place of the list while records are awaited.
         """
         time, received = record.time, self._received[topic]
+        if time < 0:
+            return None
         if received and time < _latest(received):
             received.clear()
         if topic == self._pacing and time != self._current:

@@ -52,7 +52,7 @@ DIAGNOSTICS = Topic(
     "/diagnostics",
     None,
     "twice a second of wall time",
-    "state of the run from the plant: what it waits for, tick, misses, speed",
+    "state of the run from the plant: what it waits for, tick, misses, speed; state of every node",
     "diagnostic_msgs/DiagnosticArray",
     every_tick=False,
 )
@@ -138,3 +138,23 @@ def deputy_of(name: str) -> str:
 def deputies_in(names: "list[str] | dict[str, Any]") -> list[str]:
     """Deputies that have a measurement among full topic names, sorted."""
     return sorted(deputy_of(name) for name in names if name == MEASUREMENT.of(deputy_of(name)))
+
+
+def types_of(name: str) -> list[str]:
+    """Message types, such as `formation_gnc_msgs/msg/Thrust`, of a run's topic of this full name; none for others."""
+    known = [each for each in RUN_TOPICS if each.name == name]
+    if "/" not in deputy_of(name):
+        known += [each for each in DEPUTY_TOPICS if each.of(deputy_of(name)) == name]
+    messages = [each.record.message if each.record else each.message for each in known]
+    packages = [message.rpartition("/") for message in messages]
+    return [f"{package or 'formation_gnc_msgs'}/msg/{kind}" for package, _, kind in packages]
+
+
+def formation_of(name: str, type_name: str) -> str | None:
+    """Namespace of the formation that a topic of this full name and type belongs to; None for one of no formation."""
+    tokens = name.split("/")[1:]
+    if name == DIAGNOSTICS.name:
+        return None
+    within = (index for index in range(len(tokens)) if type_name in types_of("/" + "/".join(tokens[index:])))
+    index = next(within, None)
+    return None if index is None else "".join(f"/{token}" for token in tokens[:index])

@@ -1,5 +1,6 @@
 """Relative navigation of one deputy, from measurement to estimate."""
 
+from collections.abc import Sequence
 from enum import Enum
 
 import numpy as np
@@ -53,6 +54,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         """Without a state until a fix comes; `name` is the node's, its namespace the deputy's."""
         self._deputy = name.split("/")[-2] if name.count("/") > 1 else ""
         self._state: FilterState | None = None
+        self._said_that_it_waits = False
         self._rejections = Rejections()
         super().__init__(name, parameters)
 
@@ -129,6 +131,8 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         if measurement.fix_available and not has_fix:
             reject(Rejection.FIX, "acquisition fix")
         if self._state is None:
+            if not has_fix:
+                self._await_fix(measurement.time)
             return _Action.ACQUIRE if has_fix else _Action.IGNORE
         gap = measurement.time - self._state.time
         if gap == self.configuration.design.step.nanoseconds:
@@ -143,7 +147,24 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         reject(Rejection.OUT_OF_ORDER if gap < 0 else Rejection.FUTURE, "measurement")
         return _Action.IGNORE
 
+    def first_of(self, waiting: Sequence[Measurement]) -> Measurement:
+        """The last with an acquisition fix, without a state; the last otherwise."""
+        if self._state is None:
+            return next((each for each in reversed(waiting) if _has_plausible_fix(each)), waiting[-1])
+        return waiting[-1]
+
+    @property
+    def waiting_for(self) -> str:
+        """An acquisition fix, without a state."""
+        return "an acquisition fix" if self._state is None else ""
+
+    def _await_fix(self, time: int) -> None:
+        if not self._said_that_it_waits:
+            self._said_that_it_waits = True
+            self.log(time, EventKind.WARNING, "no estimate before a measurement has an acquisition fix", "fix")
+
     def _acquire(self, measurement: Measurement) -> FilterState:
+        self._said_that_it_waits = False
         self._state = acquire(measurement, self.parameters, self.configuration.design, self._rejections)
         self.log(measurement.time, EventKind.ACQUIRED, "filter started from an acquisition fix")
         self._report_observability(self._state)
@@ -261,7 +282,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
 
     def _lose(self, time: int, reason: str) -> None:
         """Lose the state: without an estimate the tick is missed, and the next measurement has a fix."""
-        self._state = None
+        self._state, self._said_that_it_waits = None, True
         self.log(time, EventKind.LOST, f"{reason}: waiting for an acquisition fix")
 
 

@@ -8,17 +8,20 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import TransformStamped
 from visualization_msgs.msg import MarkerArray
 
 from formation_gnc.flight import topics
 from formation_gnc.records import Target, Truth
 from formation_gnc.transport.conversion import from_cdr
+from formation_gnc.transport.diagnostics import PERIOD, DiagnosticsPublisher
 from formation_gnc.transport.markers import DisplayParameters, markers, transforms
 from formation_gnc.transport.node import ConfiguredNode
 from formation_gnc.transport.process import run
 from formation_gnc.transport.qos import quality
 from formation_gnc.transport.raw_topics import first_stamp
+from formation_gnc.transport.subscriptions import Information
 from formation_gnc.types import NANOSECONDS, Vector
 
 
@@ -32,25 +35,27 @@ class DisplayNode(ConfiguredNode):
     def __init__(self) -> None:
         """Subscribe to the truth, and to the targets of the deputies in it."""
         super().__init__("display", DisplayParameters)
-        self._marker_publisher = self.create_publisher(MarkerArray, topics.MARKERS.name, quality())
+        self._marker_publisher = self.create_publisher(MarkerArray, self.full_name(topics.MARKERS.name), quality())
         self._publish_transforms = self._transform_publisher()
         self._truth: bytes | None = None
         self._targets: dict[str, bytes] = {}
         self._trails: dict[str, deque[Vector]] = {}
         self._trail_time = -1
         self.subscribe(Truth, topics.TRUTH.name, self._on_truth)
+        self._diagnostics = DiagnosticsPublisher(self, self.full_name("") or "/")
+        self.create_wall_timer(PERIOD, self._diagnose)
         self.create_wall_timer(1.0 / self.values.rate, self._draw)
 
     def _transform_publisher(self) -> Callable[[list[TransformStamped]], object]:
         try:
             from tf2_msgs.msg import TFMessage
         except ImportError:
-            single = self.create_publisher(TransformStamped, topics.TRANSFORMS.name, quality())
+            single = self.create_publisher(TransformStamped, self.full_name(topics.TRANSFORMS.name), quality())
             return lambda transforms: [single.publish(each) for each in transforms]
-        together = self.create_publisher(TFMessage, topics.TF.name, quality())
+        together = self.create_publisher(TFMessage, self.full_name(topics.TF.name), quality())
         return lambda transforms: together.publish(TFMessage(transforms=transforms))
 
-    def _on_truth(self, data: bytes) -> None:
+    def _on_truth(self, data: bytes, _: Information) -> None:
         """Keep the latest as bytes, and decode it only for the points of the trails."""
         self._truth = data
         time = first_stamp(data)
@@ -63,6 +68,15 @@ class DisplayNode(ConfiguredNode):
                 trail = self._trails.setdefault(deputy.name, deque(maxlen=points))
                 trail.append(deputy.relative_state[:3])
 
+    def _on_target(self, deputy: str, data: bytes, _: Information) -> None:
+        self._targets[deputy] = data
+
+    def _diagnose(self) -> None:
+        is_waiting = self._trail_time < 0
+        level = DiagnosticStatus.WARN if is_waiting else DiagnosticStatus.OK
+        message = f"waiting for {topics.TRUTH.name}" if is_waiting else "drawing"
+        self._diagnostics.publish(level, message, {"satellites": len(self._targets) + 1}, self._trail_time)
+
     def _draw(self) -> None:
         """Publish the latest, if there is any."""
         if self._truth is None:
@@ -71,8 +85,7 @@ class DisplayNode(ConfiguredNode):
         for deputy in truth.deputies:
             if deputy.name not in self._targets:
                 self._targets[deputy.name] = b""
-                keep = partial(self._targets.__setitem__, deputy.name)
-                self.subscribe(Target, topics.TARGET.of(deputy.name), keep)
+                self.subscribe(Target, topics.TARGET.of(deputy.name), partial(self._on_target, deputy.name))
         targets = {name: from_cdr(Target, data) for name, data in self._targets.items() if data}
         size = self.values.size or max(
             1.0, max(float(np.linalg.norm(each.relative_state[:3])) for each in truth.deputies) / 40.0

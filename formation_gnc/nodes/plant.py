@@ -10,8 +10,8 @@ from formation_gnc.flight import topics
 from formation_gnc.flight.graph import COMMAND, every_tick
 from formation_gnc.plant.parameters import PlantParameters
 from formation_gnc.records import Clock, Event, Measurement, Thrust, Truth
-from formation_gnc.sil.plant_executive import RECORDER, PlantExecutive, Report
-from formation_gnc.transport.diagnostics import ReportPublisher
+from formation_gnc.sil.plant_executive import PlantExecutive, Report
+from formation_gnc.transport.diagnostics import RUN, DiagnosticsPublisher
 from formation_gnc.transport.node import ConfiguredNode
 from formation_gnc.transport.process import run, stop_requested
 
@@ -26,8 +26,9 @@ class PlantNode(ConfiguredNode):
         records = {topics.TRUTH.name: Truth, topics.EVENTS.name: Event, topics.CLOCK.name: Clock}
         records |= {topics.MEASUREMENT.of(name): Measurement for name in deputies}
         self._publish = {topic: self.publisher_of(record, topic) for topic, record in records.items()}
-        self._report = ReportPublisher(self)
-        self._recorded_topics = {*records, *(topic for name in deputies for topic in every_tick(name))}
+        self._diagnostics = DiagnosticsPublisher(self, self.full_name("") or "/", RUN)
+        recorded = {*records, *(topic for name in deputies for topic in every_tick(name))}
+        self._recorded_topics = set(map(self.full_name, recorded))
         self.executive = PlantExecutive(self.values, self)
         for name in deputies:
             self.subscribe_decoded(Thrust, COMMAND.of(name), partial(self._on_thrust, name))
@@ -47,19 +48,27 @@ class PlantNode(ConfiguredNode):
 
     def is_published(self, topic: str) -> bool:
         """Whether anybody publishes a topic."""
-        return bool(self.count_publishers(topic))
+        return bool(self.count_publishers(self.full_name(topic)))
+
+    def publishers_of(self, topic: str) -> list[str]:
+        """Full names of the nodes that publish a topic."""
+        offers = self.get_publishers_info_by_topic(self.full_name(topic))
+        return [f"{each.node_namespace.rstrip('/')}/{each.node_name}" for each in offers]
 
     def has_recorder(self) -> bool:
         """Whether a recorder reports progress."""
         return self.is_published(topics.PROGRESS.name)
 
     def recorder_listens(self) -> bool:
-        """Whether the recorder has subscribed to every topic of the run."""
-        try:
-            heard = dict(self.get_subscriber_names_and_types_by_node(RECORDER.strip("/"), "/"))
-        except NodeNameNonExistentError:
-            return False
-        return heard.keys() >= self._recorded_topics
+        """Whether the recorder, whatever its name, has subscribed to every topic of the run."""
+        for recorder in self.get_publishers_info_by_topic(self.full_name(topics.PROGRESS.name)):
+            try:
+                heard = self.get_subscriber_names_and_types_by_node(recorder.node_name, recorder.node_namespace)
+            except NodeNameNonExistentError:
+                continue
+            if dict(heard).keys() >= self._recorded_topics:
+                return True
+        return False
 
     def log(self, text: str) -> None:
         """Say something for people."""
@@ -67,7 +76,7 @@ class PlantNode(ConfiguredNode):
 
     def report(self, report: Report) -> None:
         """Publish where the run is."""
-        self._report(report, self.executive.simulation.plant.time)
+        self._diagnostics.publish_report(report, self.executive.simulation.plant.time)
 
 
 def fly(node: PlantNode) -> None:
@@ -75,6 +84,9 @@ def fly(node: PlantNode) -> None:
     executive = node.executive
     node.spin(lambda: stop_requested() or executive.check(monotonic()), lambda: executive.period(monotonic()))
     node.spin(lambda: stop_requested() or executive.recorder_is_done())
+    figures = executive.simulation.figures(0.0)
+    how = "finished" if executive.finished else "stopped"
+    node.log(f"{how}: {figures['tick']} of {figures['ticks']} ticks flown, {figures['misses']} missed")
 
 
 def main() -> int:

@@ -8,20 +8,25 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import Trigger
 
 from formation_gnc.flight import topics
+from formation_gnc.flight.graph import GRAPH
+from formation_gnc.recording.parameter_collection import PLANT
 from formation_gnc.recording.parameters import RecorderParameters
 from formation_gnc.recording.provenance import provenance
 from formation_gnc.recording.session import RecordingSession
 from formation_gnc.recording.writer import FLUSH_INTERVAL, BagWriter, Split
 from formation_gnc.records import Clock, Event
 from formation_gnc.transport.conversion import codec
+from formation_gnc.transport.diagnostics import PERIOD, DiagnosticsPublisher
 from formation_gnc.transport.node import ConfiguredNode
 from formation_gnc.transport.parameter_reader import ParameterReader
 from formation_gnc.transport.process import run, stop_requested
 from formation_gnc.transport.qos import LATEST
 from formation_gnc.transport.raw_topics import Callback, RawTopics
+from formation_gnc.types import NANOSECONDS
 
 LOOK_PERIOD = 0.1
 """Wall time (s) between looks for new topics and nodes, and between reports of progress."""
@@ -51,7 +56,9 @@ class RecorderNode(ConfiguredNode):
             values.snapshot,
         )
         self.get_logger().info(f"recording to {directory}")
-        self._raw_topics = RawTopics(self, self._open)
+        self._diagnostics = DiagnosticsPublisher(self, self.full_name("") or "/")
+        self.create_wall_timer(PERIOD, self._diagnose)
+        self._raw_topics = RawTopics(self, self._open, self.full_name(""))
         self._reader = ParameterReader(self)
         if values.snapshot:
             self.create_service(Trigger, "~/snapshot", self._on_snapshot)
@@ -59,21 +66,57 @@ class RecorderNode(ConfiguredNode):
         self.create_wall_timer(FLUSH_INTERVAL, self.session.while_disk_lasts(self.session.bag.flush))
 
     def _open(self, topic: str, type_name: str, latched: bool) -> Callback:
-        return self.session.open_topic(topic, type_name, partial(self.count_publishers, topic), latched)
+        return self.session.open_topic(topic, type_name, partial(self.count_publishers, self.full_name(topic)), latched)
+
+    def _nodes_of_run(self, now: float) -> dict[str, str]:
+        """Full names of the nodes with parameters, by their names within the formation.
+
+        A node of the run counts by what it publishes, whatever its name.
+        """
+        formation, known = self.full_name("/"), self._reader.nodes()
+        nodes = {f"/{each.removeprefix(formation)}": each for each in known if each.startswith(formation)}
+        deputies = self.session.parameters.values.get(PLANT, {}).get("deputies", ())
+        roles = {PLANT: topics.TRUTH.name}
+        roles |= {f"/{deputy}/{row.name}": row.answer.of(deputy) for deputy in deputies for row in GRAPH}
+        for role, topic in roles.items():
+            if role in nodes:
+                continue
+            for offer in self.get_publishers_info_by_topic(self.full_name(topic)):
+                full_name = f"{offer.node_namespace.rstrip('/')}/{offer.node_name}"
+                if full_name in known:
+                    nodes[role] = full_name
+                else:
+                    self.session.parameters.offers_none(role, now)
+        return nodes
 
     def _look(self) -> None:
         session, now = self.session, monotonic()
         self._raw_topics.look()
-        session.parameters.appeared(self._reader.nodes())
+        nodes = self._nodes_of_run(now)
+        session.parameters.appeared(nodes)
         for node, record in session.parameters.due(now).items():
-            left_out = ("bag",) if node == self.get_fully_qualified_name() else ()  # where, not how, it was recorded
+            if node not in nodes:
+                continue
+            left_out = ("bag",) if nodes[node] == self.get_fully_qualified_name() else ()  # where, not how
             take = session.while_disk_lasts(partial(session.put_on_record, node, record, left_out=left_out))
-            if self._reader.ask(node, take):
+            if self._reader.ask(nodes[node], take):
                 session.parameters.asked(node, now)
-        if session.parameters.is_complete:
+        if session.parameters.is_complete(now):
             session.report_progress()
         if lost := session.new_losses():
             self.get_logger().warning(f"lost so far: {', '.join(f'{n} of {topic}' for topic, n in lost.items())}")
+
+    def _diagnose(self) -> None:
+        failure, lost, stamp = self.session.failure, self.session.lost, self.session.progress.stamp
+        level, message = DiagnosticStatus.OK, "recording"
+        if lost:
+            level, message = DiagnosticStatus.WARN, "messages were lost"
+        elif stamp < 0:
+            level, message = DiagnosticStatus.WARN, "waiting for a run"
+        if failure is not None:
+            level, message = DiagnosticStatus.ERROR, str(failure)
+        values = {"bag": self.session.bag.directory, "recorded_to": max(0, stamp) / NANOSECONDS, "lost": lost}
+        self._diagnostics.publish(level, message, values, stamp)
 
     def _on_snapshot(self, _request: Any, response: Any) -> Any:
         response.success, response.message = self.session.write_snapshot()
@@ -88,6 +131,8 @@ def record(node: RecorderNode) -> None:
         node.spin(lambda: session.is_quiet() or session.failure is not None, lambda: QUIET)
     finally:
         session.close()
+    stamp = max(0, session.progress.stamp) / NANOSECONDS
+    node.get_logger().info(f"closed {session.bag.directory}: recorded to {stamp:g} s, {session.lost} messages lost")
     if session.failure is not None:
         raise session.failure
 

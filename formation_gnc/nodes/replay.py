@@ -4,6 +4,7 @@ from functools import partial
 from time import monotonic
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import SetBool, Trigger
 
 from formation_gnc.errors import ConfigurationError
@@ -11,10 +12,12 @@ from formation_gnc.flight import topics
 from formation_gnc.recording.player import PlayedTick, ReplayParameters, TickPlayer
 from formation_gnc.records import Clock, Thrust
 from formation_gnc.transport.conversion import message_class
+from formation_gnc.transport.diagnostics import PERIOD, DiagnosticsPublisher
 from formation_gnc.transport.node import ConfiguredNode
 from formation_gnc.transport.process import run, stop_requested
 from formation_gnc.transport.qos import quality
 from formation_gnc.transport.raw_topics import first_stamp
+from formation_gnc.transport.subscriptions import Information
 from formation_gnc.types import NANOSECONDS
 
 BURST = 50
@@ -35,6 +38,8 @@ class ReplayNode(ConfiguredNode):
         self._publish_clock = self.publisher_of(Clock, topics.CLOCK.name)
         for name in sorted(self.player.answers):
             self.subscribe(Thrust, name, partial(self._on_answer, name))
+        self._diagnostics = DiagnosticsPublisher(self, self.full_name("") or "/")
+        self.create_wall_timer(PERIOD, self._diagnose)
         self.create_service(SetBool, "~/pause", self._on_pause)
         self.create_service(Trigger, "~/step", self._on_step)
 
@@ -45,7 +50,7 @@ class ReplayNode(ConfiguredNode):
         except ConfigurationError as error:
             raise ConfigurationError(f"topic {topic}: {error}") from None
         bag.check_type(topic)
-        return self.create_publisher(kind, topic, quality())
+        return self.create_publisher(kind, self.full_name(topic), quality())
 
     def _play(self, tick: PlayedTick) -> None:
         for topic, data in tick.messages:
@@ -53,7 +58,7 @@ class ReplayNode(ConfiguredNode):
         self._publish_clock(Clock(tick.stamp))
 
     def _is_published(self, topic: str) -> bool:
-        return bool(self.count_publishers(topic))
+        return bool(self.count_publishers(self.full_name(topic)))
 
     def check(self) -> bool:
         """Play what is due, and say whether that was all."""
@@ -66,7 +71,14 @@ class ReplayNode(ConfiguredNode):
                 break
         return self.player.done
 
-    def _on_answer(self, topic: str, data: bytes) -> None:
+    def _diagnose(self) -> None:
+        player = self.player
+        message = "paused" if player.paused else "at the end" if player.done else "playing"
+        stamp = player.stamp or 0
+        values = {"bag": player.bag.path, "played_to": stamp / NANOSECONDS}
+        self._diagnostics.publish(DiagnosticStatus.OK, message, values, stamp)
+
+    def _on_answer(self, topic: str, data: bytes, _: Information) -> None:
         self.player.answer(topic, first_stamp(data))
         self.check()
 

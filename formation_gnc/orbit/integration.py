@@ -66,7 +66,8 @@ def _comes_down(before: Array, after: Array, step: float) -> bool:
     cubic = 2.0 * (start - end) + start_rate + end_rate
     root = sqrt(quadratic * quadratic - 3.0 * cubic * linear)  # a minimum lies within: real
     share = -linear / (quadratic + root)
-    return start + share * (linear + share * (quadratic + share * cubic)) < EARTH_RADIUS
+    least: float = start + share * (linear + share * (quadratic + share * cubic))
+    return least < EARTH_RADIUS
 
 
 @inline

@@ -26,6 +26,7 @@ class ParameterCollection:
         self._known: set[str] = set()
         self._wanted: dict[str, str] = {}
         self._asked: dict[str, float] = {}
+        self._mute: dict[str, float] = {}
 
     def appeared(self, nodes: Collection[str]) -> list[str]:
         """Take the nodes that exist; returns the new ones."""
@@ -60,9 +61,14 @@ class ParameterCollection:
         self.values[node] = values
         return True
 
-    @property
-    def is_complete(self) -> bool:
-        """Whether the parameters of the plant and of every deputy's modules are known."""
+    def offers_none(self, node: str, now: float) -> None:
+        """Note the time (s) at which a node of the run offers no parameter services; it may yet."""
+        self._mute.setdefault(node, now)
+
+    def is_complete(self, now: float) -> bool:
+        """Whether the parameters of the plant and of every deputy's modules, if they have any, are known."""
         deputies = self.values.get(PLANT, {}).get("deputies", ())
         nodes = [f"/{deputy}/{row.name}" for deputy in deputies for row in GRAPH]
-        return bool(nodes) and all(self.values.get(node) for node in nodes)
+        return bool(nodes) and all(
+            self.values.get(node) or now - self._mute.get(node, now) > ASK_AGAIN for node in nodes
+        )

@@ -1,7 +1,11 @@
 """Progress of a recording: the stamp up to which a run is recorded completely."""
 
+from collections.abc import Callable
+
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import GRAPH
+from formation_gnc.recording.parameter_collection import PLANT
+from formation_gnc.records import Event, EventKind
 
 NONE = -1
 """Stamp before the first tick."""
@@ -24,28 +28,35 @@ class RecordingProgress:
         self._plant: dict[str, int] = {}
         self._answers: dict[str, dict[str, int]] = {}
         self._missed: dict[str, int] = {}
-        self._event = NONE
+        self._end = NONE
 
     def concerns(self, topic: str) -> bool:
         """Whether progress depends on a topic."""
         name = topic.rpartition("/")[2]
         return topic in (topics.CLOCK.name, topics.TRUTH.name) or name in (topics.MEASUREMENT.name, *self._answer_names)
 
-    def take(self, topic: str, stamp: int) -> None:
-        """Take the stamp (ns) of a message of a topic that concerns progress."""
-        deputy, name = topics.deputy_of(topic), topic.rpartition("/")[2]
-        if name in self._answer_names:
-            self._answers_of(deputy)[name] = stamp
-            return
-        if topic == topics.CLOCK.name and stamp < self._plant.get(topic, 0):
-            self.reset()
-        self._plant[topic] = stamp
+    def take(self, topic: str, stamp: int, publishers: Callable[[], int] = lambda: 1) -> None:
+        """Take the stamp (ns) of a message of a topic that concerns progress.
 
-    def take_event(self, stamp: int, missed_by: str = "") -> None:
-        """Take the stamp (ns) of an event, and for a miss the deputy that missed its tick."""
-        self._event = stamp
-        if missed_by:
-            self._missed[missed_by] = stamp
+        Time that runs backwards is a new run; where a topic has several publishers, it is another one's time.
+        """
+        deputy, name = topics.deputy_of(topic), topic.rpartition("/")[2]
+        latest = self._answers_of(deputy) if name in self._answer_names else self._plant
+        key = name if name in self._answer_names else topic
+        if stamp < latest.get(key, NONE):
+            if publishers() > 1:
+                return
+            if topic == topics.CLOCK.name:
+                self.reset()
+                latest = self._plant
+        latest[key] = stamp
+
+    def take_event(self, event: Event) -> None:
+        """Take an event: a deputy has missed its tick, or the run has ended."""
+        if event.node == PLANT and event.kind == EventKind.MISS:
+            self._missed[event.subject] = event.time
+        elif event.node == PLANT and event.kind == EventKind.END:
+            self._end = event.time
 
     @property
     def stamp(self) -> int:
@@ -56,8 +67,7 @@ class RecordingProgress:
             if deputy:
                 stamps.add(max(min(self._answers_of(deputy).values()), self._missed.get(deputy, NONE)))
         recorded = min(stamps, default=NONE)
-        # Only the end of the run is stamped after a tick.
-        return self._event if len(stamps) == 1 and self._event > recorded else recorded
+        return self._end if len(stamps) == 1 and self._end > recorded else recorded
 
     def _answers_of(self, deputy: str) -> dict[str, int]:
         return self._answers.setdefault(deputy, dict.fromkeys(self._answer_names, NONE))

@@ -13,7 +13,7 @@ from formation_gnc.recording.progress import NONE, RecordingProgress
 from formation_gnc.recording.provenance import LOST, parameters_record
 from formation_gnc.recording.snapshot import Snapshot
 from formation_gnc.recording.writer import BagWriter
-from formation_gnc.records import Event, EventKind
+from formation_gnc.records import Event
 
 REPORT_TICKS = 64
 """Most ticks between two reports of progress."""
@@ -71,8 +71,9 @@ class RecordingSession:
         self.bag.add_topic(topic, type_name, topics.QUEUE_DEPTH)
         loss = self._losses[topic] = LossCounter(publishers, latched)
         node = _answering(topic)
-        is_clock, is_events = topic == topics.CLOCK.name, topic == topics.EVENTS.name
-        concerns_progress = self.progress.concerns(topic)
+        is_ours = type_name in topics.types_of(topic)
+        is_clock, is_events = is_ours and topic == topics.CLOCK.name, is_ours and topic == topics.EVENTS.name
+        concerns_progress = is_ours and self.progress.concerns(topic)
         count = 0
 
         def take(data: bytes, stamp: int, number: int | None) -> None:
@@ -85,10 +86,9 @@ class RecordingSession:
                 self.parameters.restarted(node, stamp)
             self._write(topic, data, stamp, number or count)
             if concerns_progress:
-                self.progress.take(topic, stamp)
+                self.progress.take(topic, stamp, publishers)
             elif is_events:
-                event = self._decode_event(data)
-                self.progress.take_event(event.time, event.subject if event.kind == EventKind.MISS else "")
+                self.progress.take_event(self._decode_event(data))
             if is_clock and count % REPORT_TICKS == 0:
                 self.report_progress()
 
@@ -130,6 +130,11 @@ class RecordingSession:
             return {}
         self._lost = total
         return lost
+
+    @property
+    def lost(self) -> int:
+        """Messages lost so far."""
+        return sum(each.lost for each in self._losses.values())
 
     def is_quiet(self) -> bool:
         """Whether nothing was received since the last call; False at the first."""

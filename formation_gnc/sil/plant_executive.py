@@ -4,7 +4,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from formation_gnc.flight import topics
 from formation_gnc.flight.barrier import Decision
+from formation_gnc.flight.graph import COMMAND
 from formation_gnc.plant.parameters import PlantParameters
 from formation_gnc.records import Thrust
 from formation_gnc.sil.simulation import Simulation, Sink
@@ -17,13 +19,17 @@ REPORT_PERIOD = 0.5
 
 RECORDER = "/recorder"
 
+CONTRADICTIONS = 3
+"""Contradicting answers of a deputy that show two commanders; one that is started again may contradict itself once."""
+
 
 @dataclass(frozen=True)
 class Report:
-    """Where the run is: a word, and figures by name."""
+    """Where the run is: a word, figures by name, and what somebody should look at."""
 
     message: str
     figures: Mapping[str, float]
+    troubles: tuple[str, ...] = ()
 
 
 class Surroundings(Protocol):
@@ -37,6 +43,9 @@ class Surroundings(Protocol):
 
     def recorder_listens(self) -> bool:
         """Whether a recorder has subscribed to every topic of the run, and knows all parameters."""
+
+    def publishers_of(self, topic: str) -> list[str]:
+        """Full names of the nodes that publish a topic, this one included."""
 
     def publish(self, topic: str, record: Any) -> None:
         """Publish a record."""
@@ -62,6 +71,10 @@ class PlantExecutive:
         self._publish: Sink = surroundings.publish
         self._began = self._reported = 0.0
         self._said = ""
+        deputies = parameters.deputies
+        self._own = (topics.CLOCK.name, topics.TRUTH.name, *map(topics.MEASUREMENT.of, deputies))
+        self._commands = {COMMAND.of(deputy): deputy for deputy in deputies}
+        self._troubles: dict[str, None] = {}
 
     @property
     def finished(self) -> bool:
@@ -79,6 +92,7 @@ class PlantExecutive:
             self._say_what_is_awaited(barrier.decide(now))
             self.advance_if_ready(now)
             if now - self._reported > REPORT_PERIOD and not self.finished:
+                self._note_troubles()
                 self._report("flying", now)
         return self.finished
 
@@ -121,11 +135,32 @@ class PlantExecutive:
             self._began = now
             self.simulation.open_tick(now, self._publish)
 
+    def _rivals(self) -> Iterator[str]:
+        """Who else publishes what the plant does, in words."""
+        for topic in self._own:
+            publishers = self._around.publishers_of(topic)
+            if len(publishers) > 1:
+                yield f"only one publisher of {topic}: {' and '.join(sorted(publishers))} are in this ROS domain"
+
+    def _note_troubles(self) -> None:
+        """Publish, once each, that more than one node does what one has to."""
+        found = [f"needs {rivals}" for rivals in self._rivals()]
+        for topic in (topics.PROGRESS.name, *self._commands):
+            publishers = self._around.publishers_of(topic)
+            contradicts = self.simulation.barrier.contradictions[self._commands.get(topic, "")] >= CONTRADICTIONS
+            if len(set(publishers)) > 1 or contradicts:
+                found.append(f"{topic} has several publishers: {' and '.join(sorted(publishers))}")
+        for trouble in found:
+            if trouble not in self._troubles:
+                self._troubles[trouble] = None
+                self._publish(topics.EVENTS.name, self.simulation.warning(trouble))
+
     def _absent(self) -> list[str]:
         return list(self.simulation.unattended(self._around.is_published))
 
     def _missing(self) -> Iterator[str]:
         yield from self._absent()
+        yield from self._rivals()
         if self._parameters.wait_for_recorder and not (
             self.simulation.barrier.recorded is not None and self._around.recorder_listens()
         ):
@@ -147,4 +182,4 @@ class PlantExecutive:
     def _report(self, message: str, now: float) -> None:
         self._reported = now
         elapsed = now - self._began if self.simulation.has_begun else 0.0
-        self._around.report(Report(message, self.simulation.figures(elapsed)))
+        self._around.report(Report(message, self.simulation.figures(elapsed), tuple(self._troubles)))

@@ -5,7 +5,7 @@ import math
 import os
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -126,7 +126,7 @@ def _check_sections(path: Path, deputies: Sequence[Any]) -> None:
     unknown = [
         f"{pattern} (did you mean {_nearest(pattern, patterns)}?)"
         for pattern, _ in _sections(path)
-        if not any(_matches(pattern, node) for node in nodes)
+        if not any(matches(pattern, node) for node in nodes)
     ]
     if unknown:
         names = ", ".join(nodes if len(nodes) <= MOST_NAMED else [*nodes[:MOST_NAMED], "..."])
@@ -136,6 +136,11 @@ def _check_sections(path: Path, deputies: Sequence[Any]) -> None:
 def _nearest(pattern: str, patterns: Sequence[str]) -> str:
     """The known pattern most like one."""
     return difflib.get_close_matches(f"/{pattern.strip('/')}", patterns, n=1, cutoff=0.0)[0]
+
+
+def sections_given_to(path: Path, names: Collection[str]) -> list[tuple[str, Mapping[str, Any]]]:
+    """Sections of a parameter file for a node that has these names: pattern of nodes, and values by dotted name."""
+    return [(pattern, section) for pattern, section in _sections(path) if any(matches(pattern, name) for name in names)]
 
 
 def _directories() -> Iterator[Path]:
@@ -157,12 +162,12 @@ def _load(schema: Any, sections: list[tuple[str, Mapping[str, Any]]], node: str)
 def _given(sections: list[tuple[str, Mapping[str, Any]]], node: str) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for pattern, section in sections:
-        if _matches(pattern, node):
+        if matches(pattern, node):
             values |= section
     return values
 
 
-def _matches(pattern: str, node: str) -> bool:
+def matches(pattern: str, node: str) -> bool:
     """Whether a parameter file's node name, with ``*`` for one token and ``**`` for any, means this node."""
     expression = "".join(
         {"**": "(/[^/]+)*", "*": "/[^/]+"}.get(token, "/" + re.escape(token)) for token in pattern.strip("/").split("/")

@@ -100,6 +100,10 @@ class Simulation:
             detail = f"{plant.tick} ticks flown, {self.misses} missed"
             publish(topics.EVENTS.name, _event(plant.time, plant.tick, EventKind.END, detail))
 
+    def warning(self, detail: str) -> Event:
+        """An event of the tick in flight that somebody should look at."""
+        return _event(self.plant.time, self.plant.tick, EventKind.WARNING, detail)
+
     def figures(self, elapsed: float) -> dict[str, float]:
         """Where the run is, after so many s of wall time since its first tick opened."""
         flown = self.plant.time / NANOSECONDS

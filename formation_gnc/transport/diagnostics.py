@@ -1,31 +1,47 @@
-"""The state of a run on `/diagnostics`."""
+"""The state of a run and of its nodes on `/diagnostics`."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
 from formation_gnc.flight import topics
 from formation_gnc.sil.plant_executive import Report
-from formation_gnc.transport.qos import LATEST, quality
+from formation_gnc.transport.qos import quality
 from formation_gnc.types import NANOSECONDS
 
+PERIOD = 0.5
+"""Wall time (s) between two messages of a node."""
 
-class ReportPublisher:
-    """Publishes reports of the run."""
+RUN = "formation_gnc: run"
+"""Name of the status that is the run's report; that of a node is `formation_gnc: ` and its full name."""
 
-    def __init__(self, node: Node) -> None:
-        """Publish as a node."""
+
+class DiagnosticsPublisher:
+    """Publishes how a node is doing."""
+
+    def __init__(self, node: Node, hardware: str, name: str = "") -> None:
+        """Publish as a node, for a satellite or formation; `name` of the status, by default the node's."""
+        self._name, self._hardware = name or f"formation_gnc: {node.get_fully_qualified_name()}", hardware
         self._publisher = node.create_publisher(DiagnosticArray, topics.DIAGNOSTICS.name, quality())
 
-    def __call__(self, report: Report, time: int) -> None:
-        """Publish a report at a simulated time, ns."""
-        level = DiagnosticStatus.WARN if report.figures["misses"] else DiagnosticStatus.OK
-        values = [KeyValue(key=key, value=str(value)) for key, value in report.figures.items()]
-        status = DiagnosticStatus(level=level, name="formation_gnc: run", message=report.message, values=values)
+    def publish(self, level: bytes, message: str, values: Mapping[str, Any], time: int) -> None:
+        """Publish a state at a simulated time, ns."""
+        status = DiagnosticStatus(level=level, name=self._name, message=message, hardware_id=self._hardware)
+        status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
         array = DiagnosticArray(status=[status])
-        array.header.stamp.sec, array.header.stamp.nanosec = divmod(time, NANOSECONDS)
+        array.header.stamp.sec, array.header.stamp.nanosec = divmod(max(0, time), NANOSECONDS)
         self._publisher.publish(array)
+
+    def publish_report(self, report: Report, time: int) -> None:
+        """Publish a report of the run at a simulated time, ns: a run that waits or misses ticks is no good one."""
+        level = DiagnosticStatus.OK
+        if report.figures["misses"] or report.message not in ("flying", "finished"):
+            level = DiagnosticStatus.WARN
+        if report.troubles:
+            level = DiagnosticStatus.ERROR
+        self.publish(level, "; ".join((report.message, *report.troubles)), report.figures, time)
 
 
 def subscribe_to_reports(node: Node, callback: Callable[[Report], None]) -> None:
@@ -33,6 +49,9 @@ def subscribe_to_reports(node: Node, callback: Callable[[Report], None]) -> None
 
     def receive(array: DiagnosticArray) -> None:
         for status in array.status:
-            callback(Report(status.message, {each.key: float(each.value) for each in status.values}))
+            if status.name == RUN:
+                message, *troubles = status.message.split("; ")
+                figures = {each.key: float(each.value) for each in status.values}
+                callback(Report(message, figures, tuple(troubles)))
 
-    node.create_subscription(DiagnosticArray, topics.DIAGNOSTICS.name, receive, quality(LATEST))
+    node.create_subscription(DiagnosticArray, topics.DIAGNOSTICS.name, receive, quality())

@@ -1,28 +1,37 @@
 """The node of a flight module, whichever: its place in the graph is read from the graph table."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from time import perf_counter
+from time import perf_counter, time_ns
 from typing import Any
 
-from rcl_interfaces.msg import SetParametersResult
-from rclpy.parameter import Parameter
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.service import Service
-from rclpy.timer import Timer
 
-from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import ModuleInstance, Row
-from formation_gnc.parameters import OWN_OF_ROS
-from formation_gnc.records import Event, Timing
+from formation_gnc.flight.synchronizer import HISTORY
+from formation_gnc.parameters import dump
+from formation_gnc.records import WARNINGS, Event, EventKind, Timing
 from formation_gnc.transport.bus import IntraProcessBus
 from formation_gnc.transport.conversion import codec
+from formation_gnc.transport.diagnostics import PERIOD, DiagnosticsPublisher
 from formation_gnc.transport.node import ConfiguredNode
+from formation_gnc.transport.subscriptions import Information
 from formation_gnc.types import NANOSECONDS
 
 SETTLING = 0.1
-"""Wall time (s) that a node which has just started collects, from the first message on, before it answers."""
+"""Wall time (s) for which a node that finds messages from before its start waits for more of them."""
+
+SOON = 1_000_000
+"""The same (ns) for a node that has been busy: what has come meanwhile is received within this time."""
+
+LATE = 50_000_000
+"""Wall time (ns) after which a message that is received counts as one of several that wait."""
+
+INPUT_DEPTH = HISTORY
+"""Messages of an input that may wait: those that come at once to a node which is still starting, or is busy."""
 
 
 class ModuleNode(ConfiguredNode):
@@ -32,8 +41,9 @@ class ModuleNode(ConfiguredNode):
     that no answer waits for it, and takes effect at the next tick; it is answered when that is settled, with
     the reason if it is rejected.
 
-    A node that comes late finds the topics' history, and answers its last tick only: an answer to an older one
-    would look like a new run to those who have gone on.
+    A node that comes late, or has been busy, finds several messages, and answers the last tick only: an answer to
+    an older one would look like a new run to those who have gone on. What its module cannot start without is not
+    skipped, if it was published after the node's start.
     """
 
     def __init__(self, row: Row, bus: IntraProcessBus | None = None) -> None:
@@ -43,19 +53,24 @@ class ModuleNode(ConfiguredNode):
         """
         super().__init__(row.name, row.parameters, namespace="deputy1")
         self._bus = bus or IntraProcessBus()
-        self._instance = ModuleInstance(row, self.get_namespace().strip("/"), self.values)
+        self._instance = ModuleInstance(row, self.get_namespace().rpartition("/")[2], self.values)
         self._module = self._instance.module
         self._publish = {
             topic.of(self._instance.deputy): self._published(topic) for topic in self._instance.published()
         }
         self._publish_event = self.publisher_of(Event, topics.EVENTS.name)
-        self._publish_timing = self.publisher_of(Timing, topics.TIMING.name)
-        self._latest: dict[str, Callable[[], None]] = {}
-        self._settled = next(iter(self._instance.inputs)) in self._bus
+        self._publish_timing = self.publisher_of(Timing, topics.TIMING.of(self._instance.deputy))
+        self._started = time_ns()
+        self._waiting: dict[str, list[tuple[int, bytes]]] = {}
+        self._catch_up_soon = self.create_wall_timer(SETTLING, self._catch_up)
+        self._catch_up_soon.cancel()
+        self._decoders: dict[str, Callable[[bytes], Any]] = {}
         for topic, record in {**self._instance.inputs, **self._instance.inputs_of_others}.items():
             self._subscribe_input(topic, record)
+        self._answered, self._warning = 0, ""
+        self._diagnostics = DiagnosticsPublisher(self, self.full_name(f"/{self._instance.deputy}"))
+        self.create_wall_timer(PERIOD, self._diagnose)
         self._designer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="design")
-        self.add_on_set_parameters_callback(self._on_set_parameters)
         for service in self.services:
             if service.srv_name.endswith(("/set_parameters", "/set_parameters_atomically")):
                 _answer_from(self._designer, service)
@@ -75,21 +90,35 @@ class ModuleNode(ConfiguredNode):
         if topic in self._bus:
             self._bus.subscribe(topic, partial(self._take, topic))
         else:
-            self.subscribe(record, topic, partial(self._receive, topic, codec(record).decode))
+            self._decoders[topic] = codec(record).decode
+            self.subscribe(record, topic, partial(self._receive, topic), INPUT_DEPTH)
 
-    def _receive(self, topic: str, decode: Callable[[bytes], Any], data: bytes) -> None:
-        if self._settled:
-            self._take(topic, decode(data))
+    def _receive(self, topic: str, data: bytes, about: Information) -> None:
+        published = about["source_timestamp"]
+        if not self._waiting and time_ns() - published < LATE:
+            self._take(topic, self._decoders[topic](data))
             return
-        if not self._latest:
-            timer = self.create_wall_timer(SETTLING, lambda: self._settle(timer))
-        self._latest[topic] = partial(self._take, topic, decode(data))
+        if not self._waiting:
+            self._catch_up_soon.reset()
+        self._waiting.setdefault(topic, []).append((published, data))
 
-    def _settle(self, timer: Timer) -> None:
-        timer.cancel()
-        self._settled = True
-        for take in self._latest.values():
-            take()
+    def _catch_up(self) -> None:
+        """Go on with the last tick of those that wait, or with what the module cannot do without."""
+        self._catch_up_soon.cancel()
+        self._catch_up_soon.timer_period_ns = SOON
+        waiting, self._waiting = self._waiting, {}
+        records = {
+            topic: [(published, self._decoders[topic](data)) for published, data in messages]
+            for topic, messages in waiting.items()
+        }
+        pacing = records.get(next(iter(self._instance.inputs)), [])
+        addressed = [record for published, record in pacing[:-1] if published >= self._started]
+        addressed += [record for _, record in pacing[-1:]]
+        first = self._module.first_of(addressed).time if addressed else 0
+        for topic, messages in records.items():
+            kept = [record for _, record in messages if record.time >= first]
+            for record in kept if pacing else kept[-1:]:
+                self._take(topic, record)
 
     def _take(self, topic: str, record: Any) -> None:
         """Answer the tick when the last input of its stamp is there; the outputs go first, others wait for them."""
@@ -99,21 +128,38 @@ class ModuleNode(ConfiguredNode):
             return
         for name, output in self._instance.respond(inputs):
             self._publish[name](output)
+        self._answered += 1
         spent = perf_counter() - started
         self._bus.deliver()
         self._publish_timing(Timing(inputs[0].time, self._instance.row.name, round(spent * NANOSECONDS)))
+        self._publish_events()
+
+    def _publish_events(self) -> None:
         for event in self._instance.take_events():
             self.log_event(event)
             self._publish_event(event)
+            if event.kind in WARNINGS:
+                self._warning = str(event)
+            if event.kind in (EventKind.PARAMETERS, EventKind.REJECTED):
+                self.show_parameters(dump(self._module.parameters))
 
-    def _on_set_parameters(self, parameters: Sequence[Parameter]) -> SetParametersResult:
-        changes = {each.name: each.value for each in parameters if not each.name.startswith(OWN_OF_ROS)}
-        if changes:
-            try:
-                self._module.commit(self._module.stage(changes))
-            except ConfigurationError as rejection:
-                return SetParametersResult(successful=False, reason=str(rejection))
-        return SetParametersResult(successful=True)
+    def _diagnose(self) -> None:
+        """Publish whether it answers, and what has happened since it was last told."""
+        level, message = DiagnosticStatus.OK, "answering"
+        if not self._answered:
+            level, message = DiagnosticStatus.WARN, f"waiting for {' and '.join(self._instance.inputs)}"
+        elif self._module.waiting_for:
+            level, message = DiagnosticStatus.WARN, f"waiting for {self._module.waiting_for}"
+        elif self._warning:
+            level, message = DiagnosticStatus.WARN, self._warning
+        self._warning = ""
+        values = {"tick": self._module.time // self._module.parameters.tick_ns, "answered": self._answered}
+        self._diagnostics.publish(level, message, values, self._module.time)
+
+    def stage_parameters(self, changes: Mapping[str, Any]) -> tuple[Any, Callable[[], None]]:
+        """Design for a change; it takes effect at the next tick."""
+        staged = self._module.stage(changes)
+        return staged.parameters, lambda: self._module.commit(staged)
 
     def destroy_node(self) -> None:
         """Let no design outlive the node."""

@@ -1,12 +1,13 @@
 """What all nodes share: parameters from a schema, records on topics, the main loop."""
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from itertools import pairwise
+from collections.abc import Callable, Mapping
 from time import monotonic
 from typing import Any
 
-from rcl_interfaces.msg import ParameterDescriptor
+import yaml
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rcl_interfaces.srv import SetParameters
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
@@ -22,11 +23,13 @@ except ImportError:  # missing in other builds of Jazzy; slower, same behaviour
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight.topics import QUEUE_DEPTH
-from formation_gnc.parameters import OWN_OF_ROS, Leaf, dump, leaves, load, read_yaml
-from formation_gnc.records import WARNINGS, Event
+from formation_gnc.parameters import OWN_OF_ROS, Leaf, change, dump, leaves, load, read_yaml
+from formation_gnc.records import WARNINGS, Event, EventKind
 from formation_gnc.transport.conversion import codec, message_type
+from formation_gnc.transport.parameter_arguments import given_parameters, without_parameters
 from formation_gnc.transport.process import stop_requested
 from formation_gnc.transport.qos import LATEST, quality
+from formation_gnc.transport.subscriptions import Information, subscribe_to_all
 
 Executor: Any = EventsExecutor
 
@@ -40,54 +43,133 @@ FAREWELL = 0.5
 class ConfiguredNode(Node):  # type: ignore[misc]
     """A node whose parameters come from a schema.
 
-    `values` is the schema's instance. An override that the schema does not know or allow raises
-    ConfigurationError, as does a later change of it, with the same words, through the parameter service.
+    `values` is the schema's instance. A parameter that the schema does not know or allow raises
+    ConfigurationError, as does a later change of it, with the same words, through the parameter service. One that
+    is given to all nodes and belongs to another is left out, with a warning.
+
+    Names of topics are those within the formation, whatever namespace it is in (:meth:`full_name`).
     """
 
     def __init__(self, name: str, schema: type, namespace: str = "") -> None:
-        """Declare the schema's parameters, with values from the command line and parameter files."""
+        """Declare the schema's parameters, with values from the command line and parameter files.
+
+        namespace: of the node within its formation, unless it is remapped; empty or one token.
+        """
         self._served_by: Any = None
-        try:
-            super().__init__(
-                name,
-                namespace=namespace,
-                parameter_overrides=list(_from_command_line(sys.argv)),
-                automatically_declare_parameters_from_overrides=True,
-            )
-        except ValueError as error:  # an empty list has no type for ROS
-            raise ConfigurationError(f"a parameter is an empty list; leave it out ({error})") from None
-        given = {
-            parameter.name: parameter.value
-            for parameter in self.get_parameters_by_prefix("").values()
-            if not parameter.name.startswith(OWN_OF_ROS)
-        }
-        self.values: Any = load(schema, given)
+        super().__init__(name, namespace=namespace, cli_args=without_parameters(sys.argv), use_global_arguments=False)
+        full_name, depth = self.get_fully_qualified_name(), 2 if namespace else 1
+        self._formation = full_name.rsplit("/", depth)[0]
+        given = given_parameters(sys.argv, (full_name, full_name.removeprefix(self._formation)))
+        self._set_those_of_ros(given.take(OWN_OF_ROS))
+        for foreign, source in given.drop_foreign(schema).items():
+            self.get_logger().warning(f"parameter {foreign}, given to all nodes by {source}: none of mine, ignored")
+        self.values: Any = load(schema, given.values)
         settled = dump(self.values)
-        for leaf in leaves(schema, settled):
-            value = settled[leaf.name]
-            plain = list(value) if isinstance(value, tuple) else value
-            if leaf.name in given:
-                self.undeclare_parameter(leaf.name)
-            self.declare_parameter(leaf.name, plain, _descriptor(leaf), ignore_override=True)
+        self._leaves = {leaf.name: leaf for leaf in leaves(schema, settled)}
+        for leaf in self._leaves.values():
+            self._declare(leaf, settled[leaf.name])
+        for service in self.services:
+            if service.srv_name.endswith(("/set_parameters", "/set_parameters_atomically")):
+                service.callback = _rejecting_malformed(service.callback)
+
+    def full_name(self, topic: str) -> str:
+        """Full name of a topic, in the namespace of this formation."""
+        return f"{self._formation}{topic}"
+
+    def stage_parameters(self, changes: Mapping[str, Any]) -> tuple[Any, Callable[[], None]]:
+        """Validate a change in flight; returns the parameters with it, and what makes it.
+
+        Raises:
+            ConfigurationError: the change is not allowed; nothing has changed.
+        """
+        return change(self.values, changes), lambda: None
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """Answer the parameter services; a parameter that is set to its value is left alone, even a read-only one."""
+        of_ros = [each for each in parameter_list if each.name.startswith(OWN_OF_ROS)]
+        values = {each.name: each.value for each in parameter_list if each not in of_ros}
+        commit: Callable[[], None] | None = None
+        try:
+            if values:
+                changes = {name: self._from_ros(name, value) for name, value in values.items()}
+                parameters, commit = self.stage_parameters(changes)
+        except ConfigurationError as rejection:
+            return SetParametersResult(successful=False, reason=str(rejection))
+        of_ros = [each for each in of_ros if not self._has(each.name, each.value)]
+        if of_ros:
+            result = super().set_parameters_atomically(of_ros)
+            if not result.successful:
+                return result
+        if commit is not None:
+            self.show_parameters(dump(parameters))
+            commit()
+        return SetParametersResult(successful=True)
+
+    def show_parameters(self, values: Mapping[str, Any]) -> None:
+        """Let the parameter services give these values."""
+        shown = (_parameter(self._leaves[name], value) for name, value in values.items())
+        changed = [each for each in shown if each.value != self.get_parameter(each.name).value]
+        if changed:
+            super().set_parameters_atomically(changed)
+
+    def _declare(self, leaf: Leaf, value: Any) -> None:
+        """Declare a parameter with its value; an empty list has no type of its own."""
+        descriptor = _descriptor(leaf)
+        if value != ():
+            self.declare_parameter(leaf.name, _parameter(leaf, value).value, descriptor, ignore_override=True)
+            return
+        self.declare_parameter(leaf.name, [], ParameterDescriptor(dynamic_typing=True), ignore_override=True)
+        super().set_parameters_atomically([_parameter(leaf, value)])
+        self.set_descriptor(leaf.name, descriptor)
+
+    def _from_ros(self, name: str, value: Any) -> Any:
+        """A value as `ros2 param` sends it: what YAML 1.1 takes for text, such as 1e-06, may be meant as a number."""
+        leaf = self._leaves.get(name)
+        if leaf is None or leaf.type is str:
+            return value
+        if isinstance(value, str):
+            return _read(value)
+        if isinstance(value, list) and leaf.type != tuple[str, ...]:
+            return [_read(each) if isinstance(each, str) else each for each in value]
+        return value
+
+    def _has(self, name: str, value: Any) -> bool:
+        return bool(self.has_parameter(name) and self.get_parameter(name).value == value)
+
+    def _set_those_of_ros(self, values: Mapping[str, Any]) -> None:
+        """Set parameters that rclpy declares by itself."""
+        for name, value in values.items():
+            if not self.has_parameter(name) or self._has(name, value):
+                continue
+            result = super().set_parameters_atomically([Parameter(name, value=value)])
+            if not result.successful:
+                raise ConfigurationError(f"parameter {name}: {value!r} is not allowed; {result.reason}")
 
     def publisher_of(self, record: type, topic: str, depth: int = QUEUE_DEPTH) -> Callable[[Any], None]:
         """A function that publishes a record on a topic, of which `depth` messages are kept for late readers."""
-        publisher = self.create_publisher(message_type(record), topic, quality(depth))
+        publisher = self.create_publisher(message_type(record), self.full_name(topic), quality(depth))
         encode: Callable[[Any], bytes] = codec(record).encode
         return lambda each: publisher.publish(encode(each))
 
-    def subscribe(self, record: type, topic: str, callback: Callable[[bytes], object]) -> None:
-        """Call back with the latest message of a record on a topic, as CDR bytes."""
-        self.create_subscription(message_type(record), topic, callback, quality(LATEST), raw=True)
+    def subscribe(
+        self, record: type, topic: str, callback: Callable[[bytes, Information], object], depth: int = LATEST
+    ) -> None:
+        """Call back with a topic's messages of a record, as CDR bytes and what is known of each.
+
+        depth: messages kept between two callbacks, the latest.
+        """
+        subscribe_to_all(self, message_type(record), self.full_name(topic), callback, depth)
 
     def subscribe_decoded(self, record: type, topic: str, callback: Callable[[Any], object]) -> None:
-        """As `subscribe`, with the record."""
+        """As `subscribe`, with the record of the latest message."""
         decode: Callable[[bytes], Any] = codec(record).decode
-        self.subscribe(record, topic, lambda data: callback(decode(data)))
+        self.subscribe(record, topic, lambda data, _: callback(decode(data)))
 
     def log_event(self, event: Event) -> None:
         """Log an event at the level of its kind; rclpy allows one level per line of code."""
-        if event.kind in WARNINGS:
+        if event.kind == EventKind.LOST:
+            self.get_logger().error(str(event))
+        elif event.kind in WARNINGS:
             self.get_logger().warning(str(event))
         else:
             self.get_logger().info(str(event))
@@ -115,23 +197,44 @@ class ConfiguredNode(Node):  # type: ignore[misc]
         super().destroy_node()
 
 
+def _parameter(leaf: Leaf, value: Any) -> Parameter:
+    kind = Parameter.Type[leaf.type_name.replace(" ", "_").upper()]
+    return Parameter(leaf.name, kind, list(value) if isinstance(value, tuple) else value)
+
+
+def _read(text: str) -> Any:
+    """What a text is in YAML; the text itself where it is none."""
+    try:
+        return read_yaml(text)
+    except yaml.YAMLError:
+        return text
+
+
+def _rejecting_malformed[S](handle: Callable[[Any, S], S]) -> Callable[[Any, S], S]:
+    """A handler of requests to set parameters that rejects one with a value of no type that ROS has."""
+
+    def answer(request: Any, response: Any) -> Any:
+        try:
+            for each in request.parameters:
+                Parameter.from_parameter_msg(each)
+        except ValueError as error:
+            rejection = SetParametersResult(successful=False, reason=f"malformed request: {error}")
+            if isinstance(request, SetParameters.Request):
+                response.results = [rejection] * len(request.parameters)
+            else:
+                response.result = rejection
+            return response
+        return handle(request, response)
+
+    return answer
+
+
 def serve(*nodes: ConfiguredNode) -> None:
     """Let one executor serve nodes for all their life: a second one would lose what the first had noticed."""
     executor = Executor()
     for node in nodes:
         executor.add_node(node)
         node._served_by = executor
-
-
-def _from_command_line(arguments: Sequence[str]) -> Iterator[Parameter]:
-    """Parameters given with ``-p name:=value``.
-
-    rclpy reads them too, but lets a parameter file's section for the node override them, whatever the order.
-    """
-    for flag, rule in pairwise(arguments):
-        name, separator, value = rule.partition(":=")
-        if flag in ("-p", "--param") and separator and ":" not in name:
-            yield Parameter(name, value=read_yaml(value))
 
 
 def _descriptor(leaf: Leaf) -> ParameterDescriptor:

@@ -24,7 +24,10 @@ class ParameterReader:
         return [node for node, _, kind in services if kind == "get_parameters"]
 
     def ask(self, node: str, take: Callable[[Mapping[str, Any]], None]) -> bool:
-        """Ask a node, and let `take` have its parameters by name; returns whether its services are ready."""
+        """Ask a node, and let `take` have its parameters by name; returns whether its services are ready.
+
+        A node that gives no value for some of its parameters gives none: it has to be asked again.
+        """
         if node not in self._clients:
             self._clients[node] = AsyncParameterClient(self._node, node)
         client = self._clients[node]
@@ -36,11 +39,14 @@ class ParameterReader:
             client.get_parameters(names, callback=lambda values: on_values(names, values))
 
         def on_values(names: list[str], answer: Future) -> None:
+            values = answer.result().values
+            if len(values) != len(names):  # one of them has no value, or has gone
+                return
             take(
                 {
                     name: parameter_value_to_python(value)
-                    for name, value in zip(names, answer.result().values, strict=True)
-                    if value.type != ParameterType.PARAMETER_NOT_SET
+                    for name, value in zip(names, values, strict=True)
+                    if ParameterType.PARAMETER_NOT_SET < value.type <= ParameterType.PARAMETER_STRING_ARRAY
                 }
             )
 

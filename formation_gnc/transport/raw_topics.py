@@ -2,16 +2,17 @@
 
 import struct
 from collections.abc import Callable
-from functools import wraps
 from typing import Any
 
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
-from rclpy.qos import QoSDurabilityPolicy
+from rclpy.qos import QoSDurabilityPolicy, QoSProfile, QoSReliabilityPolicy
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
 from formation_gnc.transport.conversion import message_class
 from formation_gnc.transport.qos import quality
+from formation_gnc.transport.subscriptions import with_information
 from formation_gnc.types import NANOSECONDS
 
 Callback = Callable[[bytes, int, int | None], None]
@@ -21,24 +22,35 @@ Callback = Callable[[bytes, int, int | None], None]
 class RawTopics:
     """Subscriptions of a node to every topic that there is, those that appear later too.
 
+    In a formation, topics have their names within it, and those of other formations are left out.
+
     Messages are stamped with simulated time: their own header's if they begin with one, the latest tick's
     otherwise.
     """
 
-    def __init__(self, node: Node, open_topic: Callable[[str, str, bool], Callback]) -> None:
+    def __init__(
+        self, node: Node, open_topic: Callable[[str, str, bool], Callback], formation: str | None = None
+    ) -> None:
         """Subscribe to nothing yet.
 
         Args:
             node: the one who subscribes.
             open_topic: given a topic, its type and whether late subscribers get what was said before,
                 returns who takes its messages; raises ConfigurationError for a type that is not installed.
+            formation: namespace of the formation; None for all topics, by their full names.
         """
-        self._node, self._open = node, open_topic
+        self._node, self._open, self._formation = node, open_topic, formation
         self._known: set[str] = set()
+        self._unheard: set[str] = set()
+        self._receivers: dict[str, tuple[Any, Callable[..., None]]] = {}
+        self._subscriptions: dict[str, Any] = {}
         self._time = 0
 
     def look(self) -> None:
-        """Subscribe to the topics that have appeared since."""
+        """Subscribe to the topics that have appeared since, and again where a writer is not heard."""
+        for topic in list(self._unheard):
+            self._subscribe_to_offers(topic)
+        self._unheard.clear()
         for topic, (type_name, *_) in self._node.get_topic_names_and_types():
             if topic not in self._known:
                 self._known.add(topic)
@@ -48,13 +60,13 @@ class RawTopics:
                     self._node.get_logger().warning(f"{topic} is not heard: {error}")
 
     def _subscribe(self, topic: str, type_name: str) -> None:
+        name = self._name_of(topic, type_name)
+        if name is None:
+            return
         kind = message_class(type_name)
-        offers = self._node.get_publishers_info_by_topic(topic)
-        qos = quality()
-        if any(offer.qos_profile.durability == QoSDurabilityPolicy.VOLATILE for offer in offers):
-            qos.durability = QoSDurabilityPolicy.VOLATILE
-        take = self._open(topic, type_name, qos.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL)
-        is_clock = topic == topics.CLOCK.name
+        qos = self._offered(topic)
+        take = self._open(name, type_name, qos.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL)
+        is_clock = name == topics.CLOCK.name
         stamped = is_clock or "std_msgs/Header" in list(kind.get_fields_and_field_types().values())[:1]
 
         def receive(data: bytes, about: dict[str, Any]) -> None:
@@ -65,18 +77,34 @@ class RawTopics:
                 self._time = stamp
             take(data, stamp, about["publication_sequence_number"])
 
-        self._node.create_subscription(kind, topic, _as_executor_calls(receive), qos, raw=True)
+        self._receivers[topic] = (kind, with_information(receive))
+        self._subscribe_to_offers(topic)
 
+    def _name_of(self, topic: str, type_name: str) -> str | None:
+        """Name of a topic within the formation; None for one of another."""
+        formation = None if self._formation is None else topics.formation_of(topic, type_name)
+        if formation is None:
+            return topic
+        return topic.removeprefix(formation) if formation == self._formation else None
 
-def _as_executor_calls(receive: Callable[[bytes, dict[str, Any]], None]) -> Callable[..., None]:
-    """Take a message and what is known about it as two arguments or, from the EventsExecutor, as one pair."""
+    def _offered(self, topic: str) -> QoSProfile:
+        """The most demanding quality of service that hears every writer there is."""
+        qos = quality()
+        for offer in (each.qos_profile for each in self._node.get_publishers_info_by_topic(topic)):
+            if offer.durability == QoSDurabilityPolicy.VOLATILE:
+                qos.durability = QoSDurabilityPolicy.VOLATILE
+            if offer.reliability == QoSReliabilityPolicy.BEST_EFFORT:
+                qos.reliability = QoSReliabilityPolicy.BEST_EFFORT
+        return qos
 
-    @wraps(receive)  # rclpy looks at the signature to see whether it is wanted
-    def call(*given: Any) -> None:
-        data, about = given if len(given) == 2 else given[0]
-        receive(data, about)
-
-    return call
+    def _subscribe_to_offers(self, topic: str) -> None:
+        if topic in self._subscriptions:
+            self._node.destroy_subscription(self._subscriptions[topic])
+        kind, receive = self._receivers[topic]
+        events = SubscriptionEventCallbacks(incompatible_qos=lambda _: self._unheard.add(topic))
+        self._subscriptions[topic] = self._node.create_subscription(
+            kind, topic, receive, self._offered(topic), raw=True, event_callbacks=events
+        )
 
 
 def first_stamp(data: bytes) -> int:

@@ -3,8 +3,10 @@
 import json
 from array import array
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -90,7 +92,8 @@ def test_latest_due_schedule_entry_holds_at_any_tick(entries: list[tuple[int, in
     for tick in sorted(ticks):
         due = [gain for at, gain in in_order if at <= tick]
         assert module.tick(tick) == (due[-1] if due else 1.0)
-    assert len(module.logged()) == sum(at <= max(ticks) for at, _ in entries)
+    held = [1.0, *(gain for at, gain in in_order if at <= max(ticks))]
+    assert len(module.logged()) == sum(old != new for old, new in pairwise(held)), "what changes nothing is no event"
 
 
 def test_commit_takes_effect_at_next_tick_and_stage_has_none() -> None:
@@ -220,6 +223,14 @@ def test_schedule_committed_too_late_is_rejected_and_old_one_stays() -> None:
         ("schedule", ['{at: 9, label: "b"}'], r'["{at: 9, label: \"b\"}"]'),
         ("limits", (1.0, 2.5), "[1.0, 2.5]"),
         ("limits", array("d", [1.0, 2.5]), "[1.0, 2.5]"),
+        ("limits", array("q", [1, 3]), "[1.0, 3.0]"),
+        ("limits", np.array([1.0, 2.5]), "[1.0, 2.5]"),
+        ("limits", np.array([1, 3]), "[1.0, 3.0]"),
+        ("limits", [np.float32(1.0), np.int64(3)], "[1.0, 3.0]"),
+        ("limits", [], "[]"),
+        ("limits", np.array([]), "[]"),
+        ("gain", np.float64(2.0), "2.0"),
+        ("gain", np.int64(2), "2.0"),
     ],
 )
 def test_event_has_the_changes_as_json(name: str, value: Any, written: str) -> None:
@@ -231,6 +242,40 @@ def test_event_has_the_changes_as_json(name: str, value: Any, written: str) -> N
     assert event.kind == EventKind.PARAMETERS
     assert event.changes == [ParameterChange(name, to_json(old), written)]
     assert module.stage({name: json.loads(written)}).parameters == module.parameters
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"gain": 1},
+        {"limits": array("d", [1.0, 1.0])},
+        {"schedule": ["{at: 9, gain: 9}"]},
+        {"mass": 100.0},
+        {"label": "a", "lag": 1.0},
+    ],
+)
+def test_a_value_that_a_parameter_has_changes_nothing(changes: dict[str, Any]) -> None:
+    module = Amplifier(("{at: 9, gain: 9}",))
+    module.tick(1)
+    designed = list(module.designed)
+    module.commit(module.stage(changes))
+    module.tick(2)
+    assert (module.logged(), module.activated, module.designed) == ([], [], designed)
+
+
+def test_a_value_is_compared_with_what_waits_for_the_next_tick() -> None:
+    module = Amplifier()
+    module.commit(module.stage({"gain": 5.0}))
+    module.commit(module.stage({"gain": 5.0}))
+    module.commit(module.stage({"gain": 1.0}))
+    assert module.tick(1) == 1.0
+    assert [detail for *_, detail in module.logged()] == ["gain: 1.0 -> 5.0", "gain: 5.0 -> 1.0"]
+
+
+def test_an_event_has_only_the_parameters_that_changed() -> None:
+    module = Amplifier(("{at: 2, gain: 1, lag: 2}",))
+    module.tick(2)
+    assert [detail for *_, detail in module.logged()] == ["lag: 1.0 -> 2.0"]
 
 
 def test_time_running_backwards_starts_an_equal_run() -> None:

@@ -37,12 +37,12 @@ def test_a_node_that_does_not_answer_is_asked_again() -> None:
 
 def test_the_run_is_known_when_every_module_of_every_deputy_is() -> None:
     collection = ParameterCollection()
-    assert not collection.is_complete
+    assert not collection.is_complete(0.0)
     collection.appeared(NODES)
     for node, record in collection.due(0.0).items():
-        assert not collection.is_complete
+        assert not collection.is_complete(0.0)
         collection.received(node, record, {"deputies": ["deputy1"]})
-    assert collection.is_complete
+    assert collection.is_complete(0.0)
 
 
 def test_a_node_started_again_is_asked_again_for_its_first_answer() -> None:
@@ -53,3 +53,11 @@ def test_a_node_started_again_is_asked_again_for_its_first_answer() -> None:
     assert not collection.received(*late), "the answer of the process before"
     collection.restarted("/deputy9/stranger", 7)
     assert "/deputy9/stranger" not in collection.due(0.0)
+
+
+def test_a_node_without_parameter_services_is_not_waited_for_long() -> None:
+    collection = ParameterCollection(values={"/plant": {"deputies": ["deputy1"]}})
+    for row in GRAPH:
+        collection.offers_none(f"/deputy1/{row.name}", 1.0)
+    assert not collection.is_complete(1.0)
+    assert collection.is_complete(1.0 + 2.0 * ASK_AGAIN)

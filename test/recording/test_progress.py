@@ -7,12 +7,21 @@ from hypothesis import strategies as st
 
 from formation_gnc.flight import topics
 from formation_gnc.recording.progress import RecordingProgress
+from formation_gnc.records import Event, EventKind
 
 PLANT = (topics.CLOCK.name, topics.TRUTH.name)
 DEPUTIES = ("deputy1", "deputy2")
 MEASUREMENTS = tuple(topics.MEASUREMENT.of(name) for name in DEPUTIES)
 ANSWERS = tuple(topic.of(name) for name in DEPUTIES for topic in (topics.ESTIMATE, topics.TARGET, topics.THRUST))
 TICK = (*PLANT, *MEASUREMENTS, *ANSWERS)
+
+
+def miss(stamp: int, deputy: str) -> Event:
+    return Event(stamp, stamp, "/plant", EventKind.MISS, deputy)
+
+
+def end(stamp: int) -> Event:
+    return Event(stamp, stamp, "/plant", EventKind.END)
 
 
 def recorded(*ticks: int) -> RecordingProgress:
@@ -40,17 +49,17 @@ def test_a_miss_counts_instead_of_the_answers() -> None:
     for topic in (*PLANT, *MEASUREMENTS, *(each for each in ANSWERS if "deputy1" in each)):
         progress.take(topic, 1)
     assert progress.stamp == 0
-    progress.take_event(1, missed_by="deputy2")
+    progress.take_event(miss(1, "deputy2"))
     assert progress.stamp == 1
 
 
 def test_the_end_of_the_run_counts_when_all_else_has_come() -> None:
     progress = recorded(0, 1)
-    progress.take_event(2)
+    progress.take_event(end(2))
     assert progress.stamp == 2
     behind = recorded(0)
     behind.take(topics.CLOCK.name, 1)
-    behind.take_event(2)
+    behind.take_event(end(2))
     assert behind.stamp == 0
 
 
@@ -63,6 +72,24 @@ def test_a_plant_started_again_starts_progress_again() -> None:
     assert progress.stamp == -1, "the answers of the run before do not count"
     for topic in ANSWERS:
         progress.take(topic, 0)
+    assert progress.stamp == 0
+
+
+def test_time_of_another_publisher_does_not_start_progress_again() -> None:
+    progress = recorded(0, 1, 2)
+    for stamp in (0, 1):
+        for topic in TICK:
+            progress.take(topic, stamp, lambda: 2)
+    assert progress.stamp == 2
+    for topic in TICK:
+        progress.take(topic, 3, lambda: 2)
+    assert progress.stamp == 3
+
+
+def test_an_event_of_others_is_neither_miss_nor_end() -> None:
+    progress = recorded(0)
+    for kind in (EventKind.MISS, EventKind.END):
+        progress.take_event(Event(10**18, 0, "/somebody", kind, "deputy1"))
     assert progress.stamp == 0
 
 

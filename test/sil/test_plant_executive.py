@@ -24,12 +24,16 @@ class Graph:
     def __init__(self) -> None:
         self.published = set[str]()
         self.recorder = self.listens = False
+        self.others: dict[str, list[str]] = {}
         self.messages: list[tuple[str, Any]] = []
         self.said: list[str] = []
         self.reports: list[Report] = []
 
     def is_published(self, topic: str) -> bool:
         return topic in self.published
+
+    def publishers_of(self, topic: str) -> list[str]:
+        return ["/plant", *self.others.get(topic, [])] if "deputy1/thrust" not in topic else self.others.get(topic, [])
 
     def has_recorder(self) -> bool:
         return self.recorder
@@ -173,3 +177,54 @@ def test_the_pace_decides_when_the_next_check_is(complete: Graph) -> None:
     assert executive.period(0.001) == pytest.approx(0.009)
     executive.check(0.0101)
     assert executive.simulation.plant.tick == 1
+
+
+@pytest.mark.parametrize("topic", ["/clock", "/truth", "/deputy1/measurement"])
+def test_the_run_does_not_start_while_another_publishes_its_topics(complete: Graph, topic: str) -> None:
+    complete.others = {topic: ["/rosbag2_player"]}
+    executive = start(complete)
+    assert complete.said == [
+        f"waiting for only one publisher of {topic}: /plant and /rosbag2_player are in this ROS domain"
+    ]
+    assert not complete.messages
+    complete.others = {}
+    executive.check(0.1)
+    assert complete.said[-1] == "flying"
+
+
+@pytest.mark.parametrize("topic", ["/clock", "/truth", "/deputy1/measurement", "/recorder/progress"])
+def test_another_publisher_in_flight_is_named_once_and_withstood(complete: Graph, topic: str) -> None:
+    executive = start(complete, ticks=3)
+    complete.others = {topic: ["/other"]}
+    for now in (1.0, 2.0):
+        executive.check(now)
+        answer(executive, now)
+    (event,) = complete.events(EventKind.WARNING)
+    assert topic in event.detail
+    assert "/plant and /other" in event.detail or "/other and /plant" in event.detail
+    assert complete.reports[-1].troubles == (event.detail,)
+    answer(executive, 3.0)
+    assert executive.finished
+
+
+def test_two_controllers_of_a_deputy_are_named(complete: Graph) -> None:
+    executive = start(complete)
+    complete.others = {COMMAND.of("deputy1"): ["/deputy1/controller", "/deputy1/mine"]}
+    executive.check(1.0)
+    (event,) = complete.events(EventKind.WARNING)
+    assert event.detail == "/deputy1/thrust has several publishers: /deputy1/controller and /deputy1/mine"
+
+
+def test_two_controllers_of_one_name_contradict_each_other(complete: Graph) -> None:
+    executive = start(complete)
+    complete.others = {COMMAND.of("deputy1"): ["/deputy1/controller", "/deputy1/controller"]}
+    for tick in range(4):
+        executive.check(float(tick))
+        assert not complete.events(EventKind.WARNING), "a node that was killed is there a while longer"
+        answer(executive, float(tick), 0.0)
+        executive.answer("deputy1", Thrust(tick * 10**9, np.full(3, 1e-3)), float(tick))
+        executive.answer("deputy1", Thrust(tick * 10**9, np.zeros(3)), float(tick))  # the same is no contradiction
+        if tick == 2:
+            break
+    executive.check(9.0)
+    assert len(complete.events(EventKind.WARNING)) == 1
