@@ -82,7 +82,7 @@ BAD_OPTIONS = [
 BAD_PARAMETERS = [
     (
         "/**/plant",
-        "deputy1.thrusters.limit: [.inf, 0, 0]",
+        "deputy1.thrusters.limit: [.inf, 0.0, 0.0]",
         "/plant: parameter deputy1.thrusters.limit: inf is not allowed",
     ),
     ("/**/plant", "sede: 1", "/plant: parameter sede: unknown; did you mean seed?"),
@@ -93,7 +93,7 @@ BAD_PARAMETERS = [
     ),
     (
         "/**/plant",
-        "deputy1.relative_state: [-9e5, 0, 0, 0, 0, 0]",
+        "deputy1.relative_state: [-9e5, 0.0, 0.0, 0.0, 0.0, 0.0]",
         "must be at least the Earth's",
     ),
     ("/**/**", "chief.semi_major_axis: 6.0e+6", "perigee radius is 6000000.0 m: it must be at least"),

@@ -204,10 +204,10 @@ def test_too_many_steps_are_rejected(common, vehicle):
 
 
 def test_an_axis_without_thrust_only_rejects_plans_that_use_it(common, estimate, target):
-    vehicle = Vehicle(100.0, np.array([0.01, 0.0, 0.01]))
+    vehicle = Vehicle(100.0, np.array([0.01, 0.01, 0.0]))
     (command,) = simulate(ScriptedPlanner(common, vehicle), estimate, target, 1)
     assert command.solver == "planned"
-    (command,) = simulate(ScriptedPlanner(common, vehicle, np.array([0.0, 1e-5, 0.0])), estimate, target, 1)
+    (command,) = simulate(ScriptedPlanner(common, vehicle, np.array([0.0, 0.0, 1e-5])), estimate, target, 1)
     assert "too short" in command.fallback
 
 

@@ -130,6 +130,9 @@ def test_a_module_stands_any_message_and_answers_the_next_tick(
 class Nobody:
     """Surroundings of a plant that hears everything and says nothing."""
 
+    def publishers_of(self, topic: str) -> list[str]:
+        return ["/somebody"]
+
     def __getattr__(self, name: str) -> Any:
         return lambda *_: True
 

@@ -10,6 +10,8 @@ from formation_gnc.transport.diagnostics import RUN, DiagnosticsPublisher, subsc
 
 from .conftest import MAKERS, Bench
 
+pytestmark = pytest.mark.sil
+
 
 def statuses(bench: Bench) -> list[Any]:
     heard: list[Any] = []
@@ -44,7 +46,7 @@ def test_troubles_of_a_run_are_errors_and_come_back_as_a_report(bench: Bench) ->
     ]
     for report in given:
         publisher.publish_report(report, 0)
-    bench.spin(until=lambda: len(reports) == 3)
+    bench.spin(until=lambda: len(reports) == 3 and sum(each.name == RUN for each in heard) == 3)
     assert reports == given
     levels = [each.level for each in heard if each.name == RUN]
     assert levels == [DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR]

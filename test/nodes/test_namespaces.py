@@ -11,6 +11,8 @@ from formation_gnc.transport.node import ConfiguredNode
 
 from .conftest import Bench
 
+pytestmark = pytest.mark.sil
+
 TICKS = 5
 
 

@@ -15,6 +15,8 @@ from formation_gnc.transport.node import ConfiguredNode
 
 from .conftest import Bench
 
+pytestmark = pytest.mark.sil
+
 PROFILES = {
     "default": QoSProfile(depth=10),
     "latched": QoSProfile(depth=10, durability=QoSDurabilityPolicy.TRANSIENT_LOCAL),

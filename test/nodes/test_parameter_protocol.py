@@ -28,6 +28,8 @@ from formation_gnc.transport.node import ConfiguredNode
 
 from .conftest import MAKERS, Bench
 
+pytestmark = pytest.mark.sil
+
 EVERY_NODE = pytest.mark.parametrize("name", MAKERS)
 
 

@@ -10,14 +10,16 @@ from foxglove.websocket import PlaybackCommand
 from formation_gnc.recording import Bag
 from formation_gnc.recording.live_player import LivePlayer
 from formation_gnc.recording.writer import BagWriter
+from formation_gnc.records import Clock
+from formation_gnc.transport.conversion import to_cdr
 
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, math.nan, 100.0])
-def test_a_bag_is_played_to_its_end_at_any_requested_speed(tmp_path: Path, flight, speed) -> None:
+def test_a_bag_is_played_to_its_end_at_any_requested_speed(tmp_path: Path, speed) -> None:
     with BagWriter(tmp_path / "run", {}) as writer:
         writer.add_topic("/clock", "rosgraph_msgs/msg/Clock", depth=10)
         for second in (1, 2, 3):
-            writer.write("/clock", flight[0].data, second * 10**9, second)
+            writer.write("/clock", to_cdr(Clock(second * 10**9)), second * 10**9, second)
     player = LivePlayer(Bag(tmp_path / "run"), 0, None, 200.0)
     try:
         request = SimpleNamespace(
