@@ -194,6 +194,8 @@ class ConfiguredNode(Node):  # type: ignore[misc]
             publisher.wait_for_all_acked(Duration(seconds=max(0.0, deadline - monotonic())))
         if self._served_by is not None:
             self._served_by.remove_node(self)
+            if not self._served_by.get_nodes():
+                self._served_by.shutdown()
         super().destroy_node()
 
 
