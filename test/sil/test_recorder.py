@@ -135,8 +135,8 @@ rclpy.init(args=sys.argv)
 recorder, user = RecorderNode(), rclpy.create_node("user")
 publisher = user.create_publisher(Event, topics.EVENTS.name, quality())
 recorder.spin(lambda: publisher.get_subscription_count() > 0)
-for _ in range(50):
-    publisher.publish(Event())
+for tick in range(50):
+    publisher.publish(Event(tick=tick))
 time.sleep(2.0 * QUIET)
 process._stop_signals.append(signal.SIGINT)
 record(recorder)
