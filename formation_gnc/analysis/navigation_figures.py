@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from formation_gnc.analysis.trajectory import deputies_of
+from formation_gnc.analysis.trajectory import deputies_of, has_messages
 from formation_gnc.errors import BagError
 from formation_gnc.flight import topics
 from formation_gnc.recording.fields import Fields
@@ -144,7 +144,7 @@ def figures_of_estimates(estimates: EstimateHistory, stamps: Stamps, truth: Matr
 
 def _arrays(bag: Bag, deputy: str) -> Fields:
     topic = topics.ESTIMATE.of(deputy)
-    if topic not in bag.topics or not bag.topics[topic].count:
+    if not has_messages(bag, topic):
         raise BagError(f"{bag.path}: has no estimate of {deputy}")
     return bag.arrays(topic, ("relative_state", "covariance", "nis", "innovations", "rejections"))
 

@@ -78,9 +78,10 @@ def load_scenario(name: str, overrides: Mapping[str, Mapping[str, Any]] | None =
         ConfigurationError: no such scenario, an unreadable file, or a parameter that is not allowed.
     """
     path = find_scenario(name)
-    sections = [*_sections(path), *(overrides or {}).items()]
+    written = _sections(path)
+    sections = [*written, *(overrides or {}).items()]
     listed = _given(sections, "/plant").get("deputies", DEFAULT_DEPUTIES)
-    _check_sections(path, listed if isinstance(listed, list | tuple) else ())
+    _check_sections(path, written, listed if isinstance(listed, list | tuple) else ())
     try:
         plant = _load(PlantParameters, sections, "/plant")
         deputies = {
@@ -114,18 +115,19 @@ def given_to(path: Path, node: str, deputies: Sequence[str]) -> dict[str, Any]:
     Raises:
         ConfigurationError: the file cannot be read, is no ROS 2 parameter file, or has a section of no node.
     """
-    _check_sections(path, deputies)
-    return _given(_sections(path), node)
+    sections = _sections(path)
+    _check_sections(path, sections, deputies)
+    return _given(sections, node)
 
 
-def _check_sections(path: Path, deputies: Sequence[Any]) -> None:
-    """Raise ConfigurationError for a section that means no node of a run with these deputies."""
+def _check_sections(path: Path, sections: Sequence[tuple[str, Any]], deputies: Sequence[Any]) -> None:
+    """Raise ConfigurationError for a section of a file that means no node of a run with these deputies."""
     modules = [f"/{deputy}/{row.name}" for deputy in deputies for row in GRAPH]
     nodes = [*RUN_NODES, *modules]
     patterns = [*nodes, *(f"/**/{row.name}" for row in GRAPH)]
     unknown = [
         f"{pattern} (did you mean {_nearest(pattern, patterns)}?)"
-        for pattern, _ in _sections(path)
+        for pattern, _ in sections
         if not any(matches(pattern, node) for node in nodes)
     ]
     if unknown:
