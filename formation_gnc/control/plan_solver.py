@@ -166,7 +166,8 @@ class PlanSolver:
             self._free = free = lower < upper
             self._factor = cho_factor(self._hessian[np.ix_(free, free)], lower=True, check_finite=False)[0]
         point = np.zeros(len(gradient))
-        point[: self.count][self._free] = -dpotrs(self._factor, gradient[: self.count][self._free], lower=1)[0]
+        if self._free.any():  # LAPACK rejects an empty system
+            point[: self.count][self._free] = -dpotrs(self._factor, gradient[: self.count][self._free], lower=1)[0]
         forces = point[: self.count]
         if (forces > upper).any() or (forces < lower).any() or programme.violation(point) > 0.0:
             return None

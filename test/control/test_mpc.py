@@ -134,6 +134,13 @@ def test_there_is_no_thrust_in_predicted_eclipses(replan_interval, common, vehic
     assert np.linalg.norm(states[-1, :3]) < 0.5
 
 
+def test_a_horizon_in_eclipse_throughout_is_planned_without_thrust(common, vehicle, estimate, target):
+    law = make(common, vehicle, off_in_eclipse=True, horizon=50)
+    command = law.command(estimate(OFFSET), target(eclipses=np.array([[0.0, 40000.0]])))
+    assert command.solver == "solved"
+    assert not command.force.any()
+
+
 def test_thrust_stops_and_resumes_on_the_ticks_of_a_new_eclipse(common, vehicle, estimate, target):
     # The plan in force was made before the eclipse was predicted.
     law = make(common, vehicle, off_in_eclipse=True, horizon=50, replan_interval=3000.0)
