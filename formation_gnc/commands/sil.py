@@ -163,7 +163,7 @@ class _Display:
 
 
 def _fly_on_graph(scenario: Scenario, bag: Path, console: Console, composed: bool, display: bool) -> float:
-    from formation_gnc.sil.plant_executive import Report
+    from formation_gnc.sil.report import Report
     from formation_gnc.transport.launcher import LaunchOptions, fly_graph
 
     Run(scenario)  # what cannot be flown is rejected before anything starts

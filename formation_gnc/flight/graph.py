@@ -6,18 +6,15 @@ read from it. A new module is its class, a row here and its executable's name in
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from pkgutil import resolve_name
 from typing import Any
 
-from formation_gnc.control.controller_manager import ControllerManager, ControllerParameters
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
 from formation_gnc.flight.module import FlightModule
 from formation_gnc.flight.synchronizer import StampSynchronizer
 from formation_gnc.flight.topics import Topic
-from formation_gnc.guidance.guidance import Guidance
-from formation_gnc.guidance.parameters import GuidanceParameters
-from formation_gnc.navigation.navigation_filter import NavigationFilter
-from formation_gnc.navigation.parameters import NavigationParameters
 from formation_gnc.records import Event, NavigationState
 
 
@@ -39,19 +36,30 @@ class Row:
     """A flight module of every satellite.
 
     name: of its node and executable, and of its parameters in a scenario.
-    module: its class, called with the node's full name and its parameters.
-    parameters: its schema.
+    module_path: Python's path of its class, "package.module:Class"; imported at first use, since a process needs few.
+    parameters_path: the same of the schema of its parameters.
     takes: needed at every tick, from the own satellite.
     gives: in the order in which the module returns them; the first answers the tick.
     takes_of_others: from the fleet's other satellites; dispensable, None where one is silent.
     """
 
     name: str
-    module: type[FlightModule[Any, Any]]
-    parameters: Any
+    module_path: str
+    parameters_path: str
     takes: tuple[Input, ...]
     gives: tuple[Topic, ...]
     takes_of_others: tuple[Input, ...] = ()
+
+    @cached_property
+    def module(self) -> type[FlightModule[Any, Any]]:
+        """Its class, called with the node's full name and its parameters."""
+        found: type[FlightModule[Any, Any]] = resolve_name(self.module_path)
+        return found
+
+    @cached_property
+    def parameters(self) -> Any:
+        """The schema of its parameters."""
+        return resolve_name(self.parameters_path)
 
     @property
     def answer(self) -> Topic:
@@ -82,23 +90,23 @@ def add_module(row: Row) -> None:
 for _row in (
     Row(
         "navigation",
-        NavigationFilter,
-        NavigationParameters,
+        "formation_gnc.navigation.navigation_filter:NavigationFilter",
+        "formation_gnc.navigation.parameters:NavigationParameters",
         takes=(Input.whole(topics.MEASUREMENT),),
         gives=(topics.ESTIMATE,),
     ),
     Row(
         "guidance",
-        Guidance,
-        GuidanceParameters,
+        "formation_gnc.guidance.guidance:Guidance",
+        "formation_gnc.guidance.parameters:GuidanceParameters",
         takes=(NAVIGATION_STATE,),
         takes_of_others=(NAVIGATION_STATE,),
         gives=(topics.TARGET, topics.SEPARATION),
     ),
     Row(
         "controller",
-        ControllerManager,
-        ControllerParameters,
+        "formation_gnc.control.controller_manager:ControllerManager",
+        "formation_gnc.control.controller_manager:ControllerParameters",
         takes=(NAVIGATION_STATE, Input.whole(topics.TARGET)),
         gives=(topics.THRUST, topics.STATUS),
     ),

@@ -11,7 +11,7 @@ from functools import cache
 from math import sqrt
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from formation_gnc.navigation.kernels.linear_algebra import accumulate_information, restore_definiteness
 from formation_gnc.navigation.measurement import Readings
@@ -98,7 +98,7 @@ class _SensorNoise:
         count = len(self.terms)
         if self.factor == 1.0:
             share = self.beyond / (self.beyond + count)
-            spread = gate / chi2.isf(share, 1) if share > 0.0 else 1.0
+            spread = gate / chdtri(1, share) if share > 0.0 else 1.0
             self.factor = max(1.0, (self.white - self.state) / count, spread)
             self.terms.clear()
             self.white, self.state, self.beyond = 0.0, 0.0, 0
@@ -225,4 +225,4 @@ def _largest_ratio(count: int, false_alarm: float) -> float:
     chi-square distribution that has the same three, scaled and shifted (Hall 1983), gives the tail.
     """
     freedom = 0.54 * count
-    return 1.0 + (float(chi2.isf(false_alarm, freedom)) - freedom) / 0.6 / count
+    return 1.0 + (float(chdtri(freedom, false_alarm)) - freedom) / 0.6 / count

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from enum import Enum
 from functools import cache
 
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 WINDOW = 20
 """Updates over which normalised innovations squared (NIS) are summed."""
@@ -73,4 +73,4 @@ class Consistency:
 
 @cache
 def _largest_nis(freedom: int) -> float:
-    return float(chi2.isf(FALSE_ALARM, freedom))
+    return float(chdtri(freedom, FALSE_ALARM))

@@ -1,23 +1,25 @@
 """Kalman filters over the relative state in the Hill frame, by FilterPy."""
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cache, lru_cache
 from math import sqrt
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
-from filterpy.kalman import (
-    ExtendedKalmanFilter,
-    JulierSigmaPoints,
-    UnscentedKalmanFilter,
-    unscented_transform,
-)
 
 from formation_gnc.navigation.kernels.linear_algebra import innovation_variances, restore_definiteness
 from formation_gnc.navigation.measurement import Readings
 from formation_gnc.navigation.process import Interval, ProcessModel
 from formation_gnc.navigation.pseudo_measurements import pseudo_jacobian, pseudo_measurements
 from formation_gnc.types import Matrix, Vector
+
+
+@cache
+def filterpy() -> Any:
+    """FilterPy's filters, imported at the first call: their two seconds are for navigation nodes alone."""
+    import filterpy.kalman
+
+    return filterpy.kalman
 
 
 class RelativeFilter(Protocol):
@@ -47,7 +49,7 @@ class ExtendedFilter:
     def __init__(self, state: Vector, covariance: Matrix) -> None:
         """Start from a relative state (6,) and its covariance (6, 6)."""
         self.state, self.covariance = state, covariance
-        self._filter = ExtendedKalmanFilter(dim_x=6, dim_z=3)
+        self._filter = filterpy().ExtendedKalmanFilter(dim_x=6, dim_z=3)
 
     def predict(self, process: ProcessModel, interval: Interval, noise: Matrix) -> Matrix:
         """Predict with the process model, which gives F P F' + Q too."""
@@ -96,15 +98,15 @@ class UnscentedFilter:
     def __init__(self, state: Vector, covariance: Matrix) -> None:
         """Start from a relative state (6,) and its covariance (6, 6)."""
         self.state, self.covariance = state, covariance
-        self._points = JulierSigmaPoints(6, kappa=0.0)
-        self._filter = UnscentedKalmanFilter(6, 3, 1.0, hx=None, fx=None, points=self._points)
+        self._points = filterpy().JulierSigmaPoints(6, kappa=0.0)
+        self._filter = filterpy().UnscentedKalmanFilter(6, 3, 1.0, hx=None, fx=None, points=self._points)
 
     def predict(self, process: ProcessModel, interval: Interval, noise: Matrix) -> Matrix:
         """Propagate the points; the transition matrix is that of the mean."""
         inner = self._filter
         *_, transition = process.predict(interval, self.state, self.covariance, noise)
         points = process.propagate(interval, self._points.sigma_points(self.state, self.covariance))
-        self.state, self.covariance = unscented_transform(points, inner.Wm, inner.Wc, noise)
+        self.state, self.covariance = filterpy().unscented_transform(points, inner.Wm, inner.Wc, noise)
         restore_definiteness(self.covariance)
         return transition
 

@@ -9,7 +9,7 @@ from formation_gnc.flight.module import Configuration, FlightModule
 from formation_gnc.navigation.adaptive_noise import AdaptiveNoise
 from formation_gnc.navigation.consistency import Verdict
 from formation_gnc.navigation.filter_state import Design, FilterState, acquire, expected_observability
-from formation_gnc.navigation.filters import FILTERS
+from formation_gnc.navigation.filters import FILTERS, filterpy
 from formation_gnc.navigation.kernels.linear_algebra import are_finite
 from formation_gnc.navigation.kernels.motion import change_chief
 from formation_gnc.navigation.measurement_checks import (
@@ -56,6 +56,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         self._state: FilterState | None = None
         self._said_that_it_waits = False
         self._rejections = Rejections()
+        filterpy()  # now rather than in the first tick
         super().__init__(name, parameters)
 
     def design(self, parameters: NavigationParameters) -> Design:

@@ -10,7 +10,8 @@ from formation_gnc.flight import topics
 from formation_gnc.flight.graph import COMMAND, every_tick
 from formation_gnc.plant.parameters import PlantParameters
 from formation_gnc.records import Clock, Event, Measurement, Thrust, Truth
-from formation_gnc.sil.plant_executive import PlantExecutive, Report
+from formation_gnc.sil.plant_executive import PlantExecutive
+from formation_gnc.sil.report import Report
 from formation_gnc.transport.diagnostics import RUN, DiagnosticsPublisher
 from formation_gnc.transport.node import ConfiguredNode
 from formation_gnc.transport.process import run, stop_requested

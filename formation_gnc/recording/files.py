@@ -10,12 +10,10 @@ import zstandard
 
 from formation_gnc.errors import BagError
 from formation_gnc.recording.mcap_file import McapFile, file_number
-from formation_gnc.recording.sqlite_file import SqliteFile
 from formation_gnc.recording.stored_file import StoredFile
 
 COMPRESSED = ".zstd"
-READERS: dict[str, type[StoredFile]] = {".mcap": McapFile, ".db3": SqliteFile}
-"""By suffix of the file."""
+SUFFIXES = (".mcap", ".db3")
 
 _SQLITE = b"SQLite format 3\0"
 _ZSTD = b"\x28\xb5\x2f\xfd"
@@ -31,7 +29,7 @@ def bag_files(path: Path) -> list[Path]:
         if not path.exists():
             raise BagError(f"{path}: no such bag")
         return [path]
-    files = [file for file in path.iterdir() if Path(file.name.removesuffix(COMPRESSED)).suffix in READERS]
+    files = [file for file in path.iterdir() if Path(file.name.removesuffix(COMPRESSED)).suffix in SUFFIXES]
     if not files:
         raise BagError(f"{path}: holds no .mcap or .db3 file")
     return sorted(files, key=lambda file: (file_number(file.name.partition(".")[0]), file.name))
@@ -65,7 +63,11 @@ def _open(path: Path, unpack: Callable[[bytes], bytes] | None) -> StoredFile:
         return _unpacked(path, unpack)
     if start == _SQLITE and path.suffix != ".db3":
         raise BagError(f"{path}: is a sqlite3 file; name it .db3")
-    return (SqliteFile if path.suffix == ".db3" else McapFile)(path, unpack)
+    if path.suffix == ".db3":
+        from formation_gnc.recording.sqlite_file import SqliteFile  # its database takes half a second to import
+
+        return SqliteFile(path, unpack)
+    return McapFile(path, unpack)
 
 
 def _unpacked(path: Path, unpack: Callable[[bytes], bytes] | None) -> StoredFile:

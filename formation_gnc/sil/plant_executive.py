@@ -1,7 +1,6 @@
 """Runs the plant on the node graph: start, deadlines, pace, a recorder that lags, reports, the end."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
 from typing import Any, Protocol
 
 from formation_gnc.flight import topics
@@ -9,6 +8,7 @@ from formation_gnc.flight.barrier import Decision
 from formation_gnc.flight.graph import COMMAND
 from formation_gnc.plant.parameters import PlantParameters
 from formation_gnc.records import Thrust
+from formation_gnc.sil.report import Report
 from formation_gnc.sil.simulation import Simulation, Sink
 
 CHECK_PERIOD = 0.05
@@ -21,15 +21,6 @@ RECORDER = "/recorder"
 
 CONTRADICTIONS = 3
 """Contradicting answers of a deputy that show two commanders; one that is started again may contradict itself once."""
-
-
-@dataclass(frozen=True)
-class Report:
-    """Where the run is: a word, figures by name, and what somebody should look at."""
-
-    message: str
-    figures: Mapping[str, float]
-    troubles: tuple[str, ...] = ()
 
 
 class Surroundings(Protocol):

@@ -15,7 +15,6 @@ import yaml
 import formation_gnc
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight.graph import GRAPH
-from formation_gnc.guidance.fleet_checks import check_fleet
 from formation_gnc.parameter_yaml import RejectedYamlError
 from formation_gnc.parameters import dump, load, read_yaml
 from formation_gnc.plant.parameters import PlantParameters
@@ -77,6 +76,8 @@ def load_scenario(name: str, overrides: Mapping[str, Mapping[str, Any]] | None =
     Raises:
         ConfigurationError: no such scenario, an unreadable file, or a parameter that is not allowed.
     """
+    from formation_gnc.guidance.fleet_checks import check_fleet  # nodes that only read their section need no guidance
+
     path = find_scenario(name)
     written = _sections(path)
     sections = [*written, *(overrides or {}).items()]

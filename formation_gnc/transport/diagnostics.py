@@ -7,7 +7,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
 from formation_gnc.flight import topics
-from formation_gnc.sil.plant_executive import Report
+from formation_gnc.sil.report import Report
 from formation_gnc.transport.qos import quality
 from formation_gnc.types import NANOSECONDS
 

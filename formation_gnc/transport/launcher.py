@@ -17,7 +17,8 @@ from rclpy.executors import SingleThreadedExecutor
 
 from formation_gnc.flight.graph import MODULES
 from formation_gnc.parameters import dump
-from formation_gnc.sil.plant_executive import RECORDER, Report
+from formation_gnc.sil.plant_executive import RECORDER
+from formation_gnc.sil.report import Report
 from formation_gnc.sil.scenario import Scenario
 from formation_gnc.sil.simulation import PLANT
 from formation_gnc.transport.diagnostics import subscribe_to_reports

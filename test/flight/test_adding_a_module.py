@@ -59,8 +59,8 @@ class BurnClock(FlightModule[BurnClockParameters, float]):
 BURN_TIME = Topic("burn_time", Clock, "every tick", "time in which thrusters were commanded")
 ROW = Row(
     "burn_clock",
-    BurnClock,
-    BurnClockParameters,
+    f"{__name__}:BurnClock",
+    f"{__name__}:BurnClockParameters",
     takes=(Input.whole(topics.THRUST), Input.whole(topics.STATUS)),
     gives=(BURN_TIME,),
 )

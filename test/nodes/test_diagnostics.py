@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from formation_gnc.sil.plant_executive import Report
+from formation_gnc.sil.report import Report
 from formation_gnc.transport.diagnostics import RUN, DiagnosticsPublisher, subscribe_to_reports
 
 from .conftest import MAKERS, Bench
