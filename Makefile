@@ -2,6 +2,7 @@
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
+unexport PYTHONDONTWRITEBYTECODE  # or each process of a flight compiles the package again
 
 in_environment := source ./env.sh &&
 # An installed ROS puts pytest plug-ins of its own in the way.
