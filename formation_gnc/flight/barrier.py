@@ -14,12 +14,12 @@ LONGEST_CHECK_GAP = 0.5
 
 @dataclass(frozen=True)
 class Decision:
-    """What the barrier says of the tick in flight.
+    """Decision on the tick in flight.
 
     advance: the tick is over, and its answers are complete but for who missed it.
     waiting_for: whose answer, or the recorder's progress, is missing.
     pause: wall time (s) until the pace allows the next tick; 0 when nothing but an answer is missing.
-    overdue: whether the deadline has passed, so that the wait is worth a word.
+    overdue: whether the deadline has passed, so that the wait is worth a log line.
     """
 
     advance: bool = False
@@ -33,7 +33,7 @@ ADVANCE = Decision(advance=True)
 
 @dataclass
 class TickBarrier:
-    """Lock-step of the plant with the deputies and the recorder, on stamps and a clock that it is told.
+    """Lock-step of the plant with the deputies and the recorder, driven by stamps and a clock passed in.
 
     A tick is over when every deputy has answered it or missed it, the recorder is within its allowed lag, and
     the pace allows it. A deputy that has answered once misses a tick when it has not answered `deadline` s
@@ -52,7 +52,7 @@ class TickBarrier:
     stamp: int = -1
     """Stamp of the tick in flight, ns; -1 before the first."""
     recorded: int | None = None
-    """Stamp (ns) up to which the recorder has everything; None before it has said so."""
+    """Stamp (ns) up to which the recorder has everything; None before its first report."""
     has_recorder: bool = False
     contradictions: Counter[str] = field(default_factory=Counter)
     """By deputy, ticks to which it has given two different answers."""

@@ -1,4 +1,4 @@
-"""The executable of every flight module: its name says which row of the graph table it runs."""
+"""The executable of every flight module: its name selects the row of the graph table."""
 
 import sys
 from pathlib import Path

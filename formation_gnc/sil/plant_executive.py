@@ -24,7 +24,7 @@ CONTRADICTIONS = 3
 
 
 class Surroundings(Protocol):
-    """What the executive sees of the graph, and how it makes itself heard."""
+    """The graph as the executive sees it, and its outputs."""
 
     def is_published(self, topic: str) -> bool:
         """Whether anybody publishes a topic."""
@@ -42,7 +42,7 @@ class Surroundings(Protocol):
         """Publish a record."""
 
     def log(self, text: str) -> None:
-        """Say something for people."""
+        """Log a line."""
 
     def report(self, report: Report) -> None:
         """Publish where the run is."""

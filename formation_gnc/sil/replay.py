@@ -2,7 +2,7 @@
 
 What flew is taken from the bag alone. Parameters are its metadata records `parameters NODE`; changes in flight
 are either scheduled there, or are the `/events` of kind PARAMETERS and are committed again at their tick. A
-module is given an input only where it was given it in the recorded run, which its `timing` tells; one that had
+module is given an input only where it was given it in the recorded run, as its `timing` records; one that had
 been started again, whose messages are numbered from 1 again, is here too, with the parameters that it was
 started with then, `parameters NODE from STAMP`.
 

@@ -1,4 +1,4 @@
-"""The plant's side of a run: opens ticks, takes the deputies' answers, and steps when the barrier says so."""
+"""The plant's side of a run: opens ticks, takes the deputies' answers, and steps when the barrier allows."""
 
 from collections.abc import Callable, Collection, Iterator
 from math import inf

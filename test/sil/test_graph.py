@@ -234,24 +234,17 @@ def test_two_runs_at_once_do_not_hear_each_other(sil: StartSil, tmp_path: Path) 
         assert {Bag(run.bag).topics[topic].count for topic in GNC_TOPICS} == {300}
 
 
-def slowness() -> float:
-    """How many times longer than alone a process takes now, for what else the machine does."""
-    began = time.monotonic(), time.process_time()
-    while time.process_time() - began[1] < 0.1:
-        pass
-    return (time.monotonic() - began[0]) / (time.process_time() - began[1])
-
-
-def test_interrupt_stops_all_within_three_seconds_and_closes_the_bag(sil: StartSil) -> None:
+def test_interrupt_stops_all_sooner_than_they_started_and_closes_the_bag(sil: StartSil) -> None:
+    """Starting imports, a matter of seconds of processor time, however busy the machine: a clock of its own."""
+    started = time.monotonic()
     run = sil("--real-time-factor", "200")
     run.wait_for_flight()
     children = run.children()
     assert set(children) == {"plant", "recorder", *PARTS}
-    slow_before = slowness()
     interrupted = time.monotonic()
     os.killpg(run.process.pid, signal.SIGINT)
     status, _, errors = run.finish()
-    assert time.monotonic() - interrupted < 3.0 * max(slow_before, slowness())
+    assert time.monotonic() - interrupted < interrupted - started
     assert status == 130
     assert errors.strip().splitlines()[-1] == f"formation-gnc: interrupted; bag closed: {run.bag}"
     assert not any(Path(f"/proc/{pid}").exists() for pid in children.values())
