@@ -143,6 +143,7 @@ def test_fleet_commanded_in_flight_changes_formation_at_one_tick(
     assert capsys.readouterr().out.splitlines()[-1] == "identical on every GNC topic"
 
 
+@pytest.mark.slow  # nine processes; the four of above fly composed in the same way
 @pytest.mark.sil
 def test_eight_composed_have_the_bits_of_the_runner_without_a_miss(sil: Callable[..., Sil], tmp_path: Path) -> None:
     bags = []
