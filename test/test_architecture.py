@@ -97,6 +97,7 @@ def test_flight_algorithms_do_not_import_the_plant():
     )
 
 
+@pytest.mark.thorough
 def test_the_core_imports_without_ros():
     core = (each for each in imports() if wing(each.module) != "shell" and not each.deferred)
     assert forbidden(each for each in core if ROS.match(each.target)) == []
@@ -113,6 +114,7 @@ def test_no_module_imports_itself_through_others():
         pytest.fail(" -> ".join(error.args[1]))
 
 
+@pytest.mark.thorough
 def test_every_exception_is_still_needed():
     there = {(each.module, each.target) for each in imports()}
     assert EXCEPTIONS.keys() <= there

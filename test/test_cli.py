@@ -249,6 +249,7 @@ def test_an_interrupt_closes_the_bag(
     assert Bag(desk / "cut").topics["/truth"].count == 20
 
 
+@pytest.mark.thorough
 def test_a_reentry_ends_the_run_and_closes_the_bag(desk: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scenario(
         desk / "falling.yaml",

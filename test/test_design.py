@@ -24,6 +24,7 @@ def test_a_design_is_one_json_object_with_the_figures_of_the_law(law: str, capsy
     assert set(printed["figures"]) >= expected.get(law, set())
 
 
+@pytest.mark.thorough
 def test_a_design_is_printed_and_plotted_without_a_flight(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -53,6 +54,7 @@ def test_a_design_is_printed_and_plotted_without_a_flight(
         (["bad.yaml", "--controller", "hinf"], "/deputy1/controller: hinf: the plant has poles on the imag"),
     ],
 )
+@pytest.mark.thorough
 def test_an_impossible_design_is_rejected_in_one_line(
     options: list[str],
     words: str,

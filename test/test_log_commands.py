@@ -143,6 +143,7 @@ def test_an_unchanged_replay_gives_the_recorded_bits(
     assert again.metadata["parameters /deputy1/controller"] == Bag(reference).metadata["parameters /deputy1/controller"]
 
 
+@pytest.mark.thorough
 def test_scheduled_and_manual_changes_replay_at_their_tick(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "swaps.yaml").write_text(find_scenario("leader_follower").read_text() + SWAPS)
     bag = tmp_path / "swaps"
@@ -204,6 +205,7 @@ def test_answers_to_missing_inputs_are_copied_and_reported(
     assert again.topics["/deputy1/thrust"].count == Bag(reference).topics["/deputy1/thrust"].count
 
 
+@pytest.mark.thorough
 def test_outputs_of_a_killed_node_are_not_expected(
     reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

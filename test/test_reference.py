@@ -16,6 +16,7 @@ NEEDED = {
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.thorough
 def test_generated_documentation_is_up_to_date(page: Path) -> None:
     assert page.read_text() == PAGES[page](), f"run `{HOW_TO_WRITE}` and commit {page.relative_to(ROOT)}"
 

@@ -36,6 +36,7 @@ def test_a_single_satellite_has_no_separation() -> None:
 
 
 @pytest.mark.usefixtures("without_pictures")
+@pytest.mark.thorough
 def test_predicted_approach_is_the_least_published_separation(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

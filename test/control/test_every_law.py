@@ -58,6 +58,7 @@ def ticks(draw: Any) -> dict[str, Any]:
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 @settings(max_examples=12)
 @given(flight=st.lists(ticks(), min_size=1, max_size=4), limit=st.sampled_from([LIMIT, STRONG]))
+@pytest.mark.thorough
 def test_the_thrust_is_finite_and_within_the_limit(algorithm, flight, limit, estimate, target):
     mpc = {"mpc__keep_out_radius": 20.0, "mpc__off_in_eclipse": True, "mpc__horizon": 40}
     manager = manager_of(algorithm, thrust_limit=tuple(limit), **mpc)
@@ -130,6 +131,7 @@ def test_a_thrust_limit_of_zero_is_rejected(algorithm):
 
 @pytest.mark.parametrize("axis", "xyz")
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.thorough
 def test_an_axis_without_thruster_is_designed_without_or_refused(algorithm, axis, estimate, target):
     """Along-track thrust alone controls the in-plane motion, radial thrust alone does not."""
     limit = tuple(0.0 if each == axis else 0.01 for each in "xyz")

@@ -209,6 +209,7 @@ def cost_of_recovery(law, common, chief, day, estimate, target):
 
 
 @pytest.mark.parametrize(("axis", "eccentricity"), [(1.2e7, 0.4), (2.4e7, 0.7)])
+@pytest.mark.thorough
 def test_gains_stay_in_phase_with_a_chief_under_j2_for_a_month(axis, eccentricity, vehicle, estimate, target):
     orbit = Orbit(axis, eccentricity, inclination=0.5, argument_of_perigee=1.0)
     parameters = dataclasses.replace(ROBERTS, model="tschauner_hempel", gain="periodic")

@@ -17,6 +17,7 @@ def test_names_that_scenarios_give_are_offered():
 
 
 @pytest.mark.parametrize("name", DESIGN_MODELS)
+@pytest.mark.thorough
 def test_a_law_designed_on_any_model_recovers_an_offset_in_it(name: str, vehicle: Vehicle):
     common = CommonParameters(Orbit(7.2e6, 0.01, 1.2, 0.1, 0.2, 0.3), tick=10.0)
     model = DESIGN_MODELS[name](common)

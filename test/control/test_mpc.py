@@ -101,6 +101,7 @@ def test_an_eccentric_chief_is_tracked_with_its_own_model(vehicle, estimate, tar
     assert not any(command.fallback for command in commands)
 
 
+@pytest.mark.thorough
 def test_total_thrust_and_thrust_rate_stay_within_their_limits(common, vehicle, estimate, target):
     law = make(common, vehicle, total_thrust=0.01, thrust_rate=5e-5)
     states, forces, _ = simulate(law, HillModel(common.mean_motion), estimate, target, [60, 60, 60, 0, 0, 0], 900)
@@ -152,6 +153,7 @@ def test_thrust_stops_and_resumes_on_the_ticks_of_a_new_eclipse(common, vehicle,
     assert [bool(force.any()) for force in forces] == [True] * 30 + [False] * 30 + [True] * 20
 
 
+@pytest.mark.thorough
 def test_the_thrust_is_down_when_an_eclipse_begins(common, vehicle, estimate, target):
     """The limit on the rate is planned ahead of the eclipse: neither contradicts the other."""
     rate, window = 5e-6, np.array([[1203.0, 3300.0]])
@@ -264,6 +266,7 @@ def test_the_keep_out_sphere_about_the_chief_is_avoided(common, vehicle, estimat
     assert closest[40.0, True] > 38.0  # soft constraint
 
 
+@pytest.mark.thorough
 def test_keep_out_spheres_about_moving_neighbours_are_avoided(common, vehicle, estimate, target):
     # Two neighbours on closed orbits that meet the unconstrained path at different times.
     model, n = HillModel(common.mean_motion), common.mean_motion

@@ -55,6 +55,7 @@ def test_no_other_assignment_has_a_lower_weighted_cost(costs: Array, data: st.Da
 
 @settings(max_examples=10)
 @given(st.floats(0.0, math.tau), st.permutations(range(4)))
+@pytest.mark.thorough
 def test_fleet_in_formation_is_assigned_its_own_slots_and_phase(phase: float, order: list[int]) -> None:
     states = slot_states("three_in_plane_one_out", phase)[order]
     found = assign_with_phase(transfer_costs(states, lambda at: slot_states("three_in_plane_one_out", at), ORBIT, RATE))

@@ -125,6 +125,7 @@ def test_collision_course_is_found_between_points_and_reported_once() -> None:
 
 
 @pytest.mark.parametrize("model", ["hill", "j2_mean_motion", "yamanaka_ankersen"])
+@pytest.mark.thorough
 def test_fleet_in_formation_is_assigned_the_slots_it_is_in(model: str) -> None:
     order = [2, 0, 3, 1]
     states = on_the_ring(1.234)[order]
@@ -139,6 +140,7 @@ def test_fleet_in_formation_is_assigned_the_slots_it_is_in(model: str) -> None:
     assert [event.kind for event in fleet["deputy1"].take_events()] == [EventKind.ASSIGNMENT]
 
 
+@pytest.mark.thorough
 def test_slots_are_assigned_anew_at_a_scheduled_change_of_formation() -> None:
     change = "{at: 100.0, formation: three_in_plane_one_out}"
     fleet = fleet_of_four(assignment="delta_v", formation="tetrahedral", schedule=(change,))
@@ -234,6 +236,7 @@ def test_one_deputy_cannot_change_an_assigned_formation() -> None:
     guidance.stage({"separation_warning": 5.0})
 
 
+@pytest.mark.thorough
 def test_fleet_commanded_one_by_one_changes_at_one_tick_to_one_assignment() -> None:
     fleet = fleet_of_four(assignment="delta_v", reconfiguration_time=500.0)
     states = on_the_ring(0.0)

@@ -77,6 +77,7 @@ def test_five_sensors_stay_within_metres_of_the_truth(sensor: str, noise: float,
     assert np.mean([squares for _, squares, _ in runs]) < 12.0  # one run alone has few independent errors
 
 
+@pytest.mark.thorough
 def test_radius_noise_does_not_wind_up_over_three_orbits() -> None:
     errors, squares, _ = fly("radius", 2.0, 0.0, 3 * ORBIT, sensors=THREE)
     assert errors.max() < 5.0  # kilometres where the covariance as a whole is inflated
@@ -93,6 +94,7 @@ def test_radius_noise_does_not_wind_up_over_three_orbits() -> None:
     ],
     ids=lambda changes: str(next(iter(changes.values()))),
 )
+@pytest.mark.thorough
 def test_every_filter_stays_within_metres_of_the_truth(changes: dict[str, Any]) -> None:
     for noise, outliers in TROUBLES:
         errors, squares, _ = fly("radius", noise, outliers, ORBIT // 2, sensors=THREE, **changes)

@@ -550,6 +550,7 @@ def check(estimate: Estimate) -> None:
     st.booleans(),
 )
 @settings(max_examples=60)
+@pytest.mark.thorough
 def test_estimates_stay_finite_and_definite_for_any_stream(
     spoils: list[tuple[int, int, str]],
     doubled: list[int],

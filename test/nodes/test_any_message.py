@@ -155,6 +155,7 @@ def test_the_plant_stands_any_command_and_any_progress(
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=20)
 @given(data=st.data())
+@pytest.mark.thorough
 def test_the_recorder_stands_any_message_of_any_topic(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
 ) -> None:

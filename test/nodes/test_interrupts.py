@@ -19,6 +19,7 @@ sys.exit(main())
 
 @pytest.mark.parametrize("line", ["imports begin", "imports end"])
 @pytest.mark.parametrize("node", ["plant", "recorder"])
+@pytest.mark.thorough
 def test_an_interrupt_at_the_start_prints_no_traceback(node: str, line: str, tmp_path: str) -> None:
     process = subprocess.Popen(
         [sys.executable, "-c", START.format(node)],

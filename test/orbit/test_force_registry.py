@@ -123,6 +123,7 @@ def test_acceleration_is_the_derivative_of_the_propagated_velocity():
     assert change == pytest.approx((begin + 4.0 * half + end)[0] / 6.0, abs=5e-12)
 
 
+@pytest.mark.thorough
 def test_forces_with_the_same_parameter_name_are_rejected(tmp_path):
     script = """
 from formation_gnc.orbit.forces import registry

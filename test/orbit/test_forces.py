@@ -119,6 +119,7 @@ def harmonic_potential(degree):
 @pytest.mark.parametrize(
     "place", [(6.6e6, 0.2, 0.5), (7e6, -0.7, 4.0), (6.8e6, 0.999, 2.0), (4.2e7, 0.0, 3.0)], ids=str
 )
+@pytest.mark.thorough
 def test_harmonic_acceleration_is_the_gradient_of_its_potential(degree, place):
     position = point(*place)
     ours = np.array(harmonics.acceleration(degree, 1.0, 0.0, *position)) + MU * position / place[0] ** 3

@@ -122,6 +122,7 @@ WHOLE_ENOUGH = {"a cut bag", "a bag without messages", "another version's messag
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.thorough
 def test_a_bad_bag_is_rejected_in_one_line(
     bad: dict[str, Path], command: str, kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -99,6 +99,7 @@ def test_a_bag_cut_in_its_index_is_recovered_whole(log, damaged, tmp_path) -> No
 
 @on_one_file
 @given(st.data())
+@pytest.mark.thorough
 def test_a_cut_loses_at_most_its_chunk(log, damaged, data) -> None:
     path, messages, spans = log
     content = path.read_bytes()
@@ -148,6 +149,7 @@ def test_a_flipped_byte_is_detected_and_spares_the_other_chunks(log, damaged, da
 
 @on_one_file
 @given(st.data())
+@pytest.mark.thorough
 def test_any_damage_ends_in_a_status(log, damaged, data) -> None:
     path, _, _ = log
     content = bytearray(path.read_bytes())

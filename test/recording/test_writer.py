@@ -176,6 +176,7 @@ while True:  # stamped with wall time, to measure the loss
     "moment",
     [0.9, *(pytest.param(0.1 * (number + number % 7), marks=pytest.mark.slow) for number in range(20))],
 )
+@pytest.mark.thorough
 def test_a_kill_loses_at_most_half_a_second(tmp_path, moment) -> None:
     process = subprocess.Popen(
         [sys.executable, "-c", WRITES_UNTIL_KILLED, str(tmp_path / "run")], stdout=subprocess.PIPE, text=True

@@ -90,6 +90,7 @@ def test_error_falls_with_the_square_of_j2():
     assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.1)
 
 
+@pytest.mark.thorough
 def test_transition_improves_on_tschauner_hempel_by_the_order_of_j2():
     elements = Elements(8e6, 0.1, 1.0, 0.3, 0.4, 0.5)
     model = GimAlfriendModel(elements)

@@ -84,6 +84,7 @@ def test_bounded_state_has_the_chiefs_energy(elements, state):
     assert elements_from_state(deputy).semi_major_axis == pytest.approx(elements.semi_major_axis, rel=1e-11)
 
 
+@pytest.mark.thorough
 def test_energy_is_conserved():
     elements = Elements(9e6, 0.2, 0.7, 0.0, 0.3, 1.0)
     chief, model = state_from_elements(elements), NonlinearModel(KeplerChief.of(elements))

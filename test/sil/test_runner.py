@@ -235,6 +235,7 @@ def test_a_scheduled_swap_takes_over_at_its_tick_and_no_command_is_missed() -> N
     assert not forces(records)[-1].any()
 
 
+@pytest.mark.thorough
 def test_mpc_gives_no_thrust_in_an_eclipse_that_guidance_foresees() -> None:
     mpc = {"algorithm": "mpc", "mpc.off_in_eclipse": True, "mpc.horizon": 45}
     _, records = fly({"/**": {"tick": 10.0}, "/**/controller": mpc}, ticks=1200)
