@@ -90,6 +90,7 @@ def test_nobody_imports_nodes():
     assert forbidden(each for each in inside() if place(each.target) == "nodes" != place(each.module)) == []
 
 
+@pytest.mark.thorough
 def test_flight_algorithms_do_not_import_the_plant():
     algorithms = {"navigation", "guidance", "control", "supervision"}
     assert (
@@ -146,10 +147,12 @@ def test_no_file_is_longer_than_350_lines():
     assert {file: number for file, number in long_files().items() if file not in LONG_FILES} == {}
 
 
+@pytest.mark.thorough
 def test_no_function_is_longer_than_60_lines():
     assert {name: number for name, number in long_functions().items() if name not in LONG_FUNCTIONS} == {}
 
 
+@pytest.mark.thorough
 def test_names_of_tests_have_70_characters_at_most():
     names = [
         f"{path.relative_to(ROOT)}: {function.name}"

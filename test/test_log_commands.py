@@ -194,6 +194,7 @@ def rewritten(
     return directory
 
 
+@pytest.mark.thorough
 def test_answers_to_missing_inputs_are_copied_and_reported(
     reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -250,6 +251,7 @@ def test_a_restarted_node_replays_with_its_recorded_parameters(
     assert set(again.arrays("/deputy1/status")["algorithm"].tolist()) == {"hinf"}
 
 
+@pytest.mark.thorough
 def test_a_changed_replay_differs_only_where_it_was_changed(
     reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -78,6 +78,7 @@ def navigate(capsys: pytest.CaptureFixture[str], bag: Path, parameters: str = ""
     return json.loads(capsys.readouterr().out)["deputies"]["deputy1"]
 
 
+@pytest.mark.thorough
 def test_one_more_sensor_gives_other_estimates_of_the_same_flight(
     bag: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -88,6 +89,7 @@ def test_one_more_sensor_gives_other_estimates_of_the_same_flight(
     assert more["now"]["estimates"] == more["recorded"]["estimates"] == 600
 
 
+@pytest.mark.thorough
 def test_the_table_says_whether_the_bits_are_the_recorded_ones(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["navigate", str(bag)]) == 0
     assert "bit for bit" in capsys.readouterr().out

@@ -77,6 +77,7 @@ def test_colcon_takes_both_for_ros_packages_from_the_repository_root():
     assert colcon_list(ROOT) == {"formation_gnc": "ros.ament_python", "formation_gnc_msgs": "ros.ament_cmake"}
 
 
+@pytest.mark.thorough
 def test_colcon_takes_both_for_ros_packages_in_a_workspace(tmp_path):
     assert colcon_list(workspace(tmp_path)) == {
         "formation_gnc": "ros.ament_python",
@@ -95,6 +96,7 @@ def test_versions_agree():
 
 
 @needs_set_up
+@pytest.mark.thorough
 def test_package_xml_declares_the_ros_packages_in_use():
     files = [*ROOT.glob("formation_gnc/**/*.py"), *ROOT.glob("launch/*.py")]
     imported = {name.split(".")[0] for file in files for name in imports(file)}

@@ -210,6 +210,7 @@ numbers = st.floats(-1e200, 1e200)
     inertia=st.floats(0.0, 10.0),
     reach=st.floats(1e-3, 1e6),
 )
+@pytest.mark.thorough
 def test_any_input_gives_a_finite_force_within_the_limit(states, inertia, reach, estimate, target):
     values = {"chief.semi_major_axis": 7.5e6, "tick": 10.0, "algorithm": "adaptive_lqr"}
     values |= {"adaptive_lqr.inertia": inertia, "adaptive_lqr.reach": reach}

@@ -70,6 +70,7 @@ def test_every_channel_satisfies_its_bound_at_every_frequency(parameters):
     assert (values["S"].max(axis=1) * performance[:, 0]).max() > 0.5 * law.optimal_gamma
 
 
+@pytest.mark.thorough
 def test_the_optimal_gamma_is_that_of_python_control():
     control = pytest.importorskip("control")
     problem = fresh("output").problem

@@ -83,6 +83,7 @@ def test_the_integral_removes_the_offset_of_a_constant_disturbance(common, vehic
     assert np.linalg.norm(gone[-1, :3]) < 1e-2 * np.linalg.norm(left[-1, :3])  # and still decreasing
 
 
+@pytest.mark.thorough
 def test_a_saturated_axis_does_not_wind_up(common, vehicle, estimate, target):
     parameters = dataclasses.replace(ROBERTS, integral_error=2_000.0)
     law = LinearQuadraticRegulator(parameters, common, vehicle)

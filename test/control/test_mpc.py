@@ -113,6 +113,7 @@ def test_total_thrust_and_thrust_rate_stay_within_their_limits(common, vehicle, 
 
 
 @pytest.mark.parametrize("replan_interval", [0.0, 1200.0])
+@pytest.mark.thorough
 def test_there_is_no_thrust_in_predicted_eclipses(replan_interval, common, vehicle, estimate, target):
     # Kremmydas: the last third of every orbit.
     law = make(common, vehicle, off_in_eclipse=True, horizon=50, replan_interval=replan_interval)

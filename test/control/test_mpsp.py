@@ -161,6 +161,7 @@ numbers = st.floats(-1e7, 1e7)
     final_time=st.floats(1.0, 3000.0),
     prediction=st.sampled_from(["rk4", "euler"]),
 )
+@pytest.mark.thorough
 def test_any_input_gives_a_finite_force_within_the_limit(
     name, states, chief, on_orbit, final_time, prediction, estimate, target
 ):

@@ -127,6 +127,7 @@ def test_inadmissible_weights_are_rejected(common, vehicle):
 
 
 @pytest.mark.parametrize(("law", "parameters"), [(FiniteSdre, SdreFiniteParameters), (Asre, AsreParameters)])
+@pytest.mark.thorough
 def test_a_reconfiguration_arrives_on_time_and_is_held(law, parameters, estimate, target):
     """From within 1 km to 8 km about an eccentric chief with J2."""
     common = CommonParameters(Orbit(1e7, 0.15), tick=10.0)

@@ -71,6 +71,7 @@ def test_three_sensors_stay_within_metres_of_the_truth(sensor: str, noise: float
 
 @pytest.mark.parametrize("sensor", FIVE)
 @pytest.mark.parametrize(("noise", "outliers"), TROUBLES)
+@pytest.mark.thorough
 def test_five_sensors_stay_within_metres_of_the_truth(sensor: str, noise: float, outliers: float) -> None:
     runs = [fly(sensor, noise, outliers, ORBIT, seed, sensors=FIVE) for seed in (1, 2)]
     assert max(errors.max() for errors, _, _ in runs) < 10.0

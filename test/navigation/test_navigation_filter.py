@@ -141,6 +141,7 @@ def test_covariance_stays_large_in_the_unobservable_direction_only() -> None:
     st.floats(-3.0, 3.0),
 )
 @settings(max_examples=20)
+@pytest.mark.thorough
 def test_the_gramian_finds_the_predicted_direction_at_any_inclination(
     axis: float, eccentricity: float, inclination: float, perigee: float, anomaly: float
 ) -> None:
@@ -163,6 +164,7 @@ def test_the_predicted_direction_is_that_of_the_seed_cases() -> None:
     np.testing.assert_allclose(predicted_unobservable_direction(chief), expected / np.linalg.norm(expected), atol=1e-9)
 
 
+@pytest.mark.thorough
 def test_the_estimate_names_the_unobservable_direction_and_follows_it() -> None:
     setup = parameters(LEO, tick=10.0)
     filter = navigation_filter(setup)

@@ -94,6 +94,7 @@ def test_acceleration_by_default_is_point_mass_and_j2():
     assert np.array_equal(Propagator(1.0).acceleration(0.0, states)[0], point_mass_with_j2(states[0]))
 
 
+@pytest.mark.thorough
 def test_acceleration_is_the_sum_of_the_forces_over_the_mass():
     state, body, angle = state_from_elements(ELEMENTS), Body(50.0, 2.0, 2.1, 1.4), earth_rotation_angle(EPOCH + 60.0)
     x, y, z, vx, vy, vz = state

@@ -137,6 +137,7 @@ def test_harmonics_rotate_with_the_earth(radius, sine, longitude, turn):
     assert turned == pytest.approx(rotation @ fixed, abs=1e-13)
 
 
+@pytest.mark.thorough
 def test_harmonics_are_finite_and_symmetric_at_the_pole():
     pole = np.array(harmonics.acceleration(20, 1.0, 0.0, 0.0, 0.0, 7e6))
     beside = np.array(harmonics.acceleration(20, 1.0, 0.0, 1e-3, 0.0, 7e6))

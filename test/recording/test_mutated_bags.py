@@ -118,6 +118,7 @@ def write(path: Path, data: Any, kinds: dict[str, tuple[str, bytes]], messages: 
 @pytest.mark.parametrize("command", COMMANDS)
 @settings(max_examples=12, deadline=None, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
+@pytest.mark.thorough
 def test_mutated_records_never_raise_a_traceback(
     recorded: Any, tmp_path: Path, command: str, data: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:

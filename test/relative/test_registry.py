@@ -48,6 +48,7 @@ def test_periodic_models_repeat_after_a_period(name: str):
 
 
 @pytest.mark.parametrize("name", [name for name, model in MODELS.items() if model.has_closed_form])
+@pytest.mark.thorough
 def test_closed_form_transitions_are_the_integrated_ones(name: str):
     model = about(name)
     duration, unit = 2.3 * model.period, np.repeat([1.0, 1e-3], 3)
