@@ -1,5 +1,6 @@
 """The bag writer beside the bare MCAP writer on the same bytes, and a report of a million messages."""
 
+import struct
 import subprocess
 import sys
 import tempfile
@@ -29,6 +30,9 @@ LONG = 1_000_000
 """Messages of the bag that is reported."""
 
 ROUNDS = 5
+
+_HEADER, _STAMP = 4, struct.Struct("<iI")
+"""Bytes before the stamp that a message begins with, and its form: s and ns."""
 
 Message = tuple[str, bytes, int]
 Definitions = dict[str, TopicDefinition]
@@ -65,11 +69,14 @@ def flight(directory: Path) -> tuple[Definitions, list[Message]]:
 
 
 def again(messages: list[Message]) -> Iterator[Message]:
-    """The flight over and over, each time later."""
+    """The flight over and over, each time later, also by the stamp that every message begins with."""
     begin = 0
     while True:
-        yield from ((topic, data, begin + stamp) for topic, data, stamp in messages)
-        begin += TICKS * NANOSECONDS
+        for topic, data, stamp in messages:
+            seconds, nanoseconds = _STAMP.unpack_from(data, _HEADER)
+            later = _STAMP.pack(seconds + begin, nanoseconds)
+            yield topic, data[:_HEADER] + later + data[_HEADER + _STAMP.size :], begin * NANOSECONDS + stamp
+        begin += TICKS  # of a second
 
 
 def record(path: Path, definitions: Definitions, messages: Iterator[Message]) -> float:
@@ -128,11 +135,13 @@ def run() -> list[Result]:
         definitions, messages = flight(directory / "flight")
         numbers = iter(range(10**6))
 
+        flown = list(islice(again(messages), MESSAGES))
+
         def with_ours() -> float:
-            return record(directory / f"{next(numbers)}", definitions, islice(again(messages), MESSAGES))
+            return record(directory / f"{next(numbers)}", definitions, iter(flown))
 
         def with_theirs() -> float:
-            return write(directory / f"{next(numbers)}.mcap", definitions, islice(again(messages), MESSAGES))
+            return write(directory / f"{next(numbers)}.mcap", definitions, iter(flown))
 
         ours, theirs = interleaved([with_ours, with_theirs], ROUNDS)
         bags = {count: directory / f"bag_{count}" for count in (LONG // 10, LONG)}
