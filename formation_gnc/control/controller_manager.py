@@ -20,9 +20,16 @@ class ControllerParameters(ModuleParameters):
     """Parameters of the controller node: those common to all laws, and each law's own under its name."""
 
     algorithm: str = parameter("lqr", choices=ALGORITHMS, in_flight=True, doc="active control law")
-    mass: float = parameter(100.0, unit="kg", above=0.0, doc="initial mass of the deputy, for the design")
+    mass: float = parameter(
+        100.0, follows="{deputy}.mass", unit="kg", above=0.0, doc="initial mass of the deputy, for the design"
+    )
     thrust_limit: tuple[float, ...] = parameter(
-        (0.01, 0.01, 0.01), unit="N", length=3, minimum=0.0, doc="largest force per Hill axis"
+        (0.01, 0.01, 0.01),
+        follows="{deputy}.thrusters.limit",
+        unit="N",
+        length=3,
+        minimum=0.0,
+        doc="largest force per Hill axis",
     )
     handover_step: float = parameter(
         0.1,
@@ -35,11 +42,12 @@ class ControllerParameters(ModuleParameters):
     laws: Mapping[str, Any] = per_entry(ALGORITHMS)
 
     def __post_init__(self) -> None:
-        """Raise ParameterError for a thrust limit of zero on every axis."""
+        """Raise ParameterError for a thrust limit of zero on every axis, unless no thrust is wanted."""
         super().__post_init__()
-        if not any(self.thrust_limit):
+        if not any(self.thrust_limit) and self.algorithm != "coast":
             raise ParameterError(
-                f"parameter thrust_limit: {list(self.thrust_limit)} is not allowed; one axis must push"
+                f"parameter thrust_limit: {list(self.thrust_limit)} is not allowed; "
+                "one axis must push, or algorithm be coast"
             )
 
 
