@@ -94,7 +94,7 @@ def test_a_value_that_is_given_wins_and_the_difference_is_told() -> None:
 def test_shipped_scenarios_say_nothing_twice(name: str) -> None:
     assert load_scenario(name).departures() == []
     text = find_scenario(name).read_text()
-    modules = text[text.index("navigation:") :]
+    modules = text[text.index("\n/**/") :]
     followers = [leaf.name for row in MODULES.values() for leaf in leaves(row.parameters, {}) if leaf.limits.follows]
     assert [name for name in followers if f" {name}:" in modules] == []
 
