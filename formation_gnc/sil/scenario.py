@@ -69,7 +69,7 @@ class Scenario:
 
     def text(self, extra: Mapping[str, Mapping[str, Any]] | None = None) -> str:
         """The scenario as a ROS 2 parameter file, nothing left to defaults and `extra` on top of it."""
-        nodes = self.parameters() | dict(self.others)
+        nodes = self.parameters() | {node: dict(values) for node, values in self.others.items()}
         for node, values in (extra or {}).items():
             nodes[node] = nodes.get(node, {}) | dict(values)
         document = {

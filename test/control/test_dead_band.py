@@ -71,9 +71,9 @@ def test_the_law_ends_when_free_motion_stays_in_the_band(position: list[float], 
     """Of a revolution; the bound adds drift and oscillation, whose extremes need not meet."""
     error, times = [*position, *velocity], np.linspace(0.0, 2.0 * np.pi / RATE, 200)
     extent = np.abs(HillModel(RATE).transition(0.0, times) @ np.array(error))[:, :3].max(axis=0)
-    assert not is_tolerated(error, 0.99 * extent, RATE, is_silent=False)
-    assert is_tolerated(error, 3.0 * extent + 1e-9, RATE, is_silent=False)
-    assert is_tolerated(error, np.abs(position) + 1e-9, RATE, is_silent=True)
+    assert not is_tolerated(error, (0.99 * extent).tolist(), RATE, is_silent=False)
+    assert is_tolerated(error, (3.0 * extent + 1e-9).tolist(), RATE, is_silent=False)
+    assert is_tolerated(error, [abs(each) + 1e-9 for each in position], RATE, is_silent=True)
 
 
 def test_a_band_can_change_in_flight_and_is_checked() -> None:
@@ -99,7 +99,7 @@ def test_a_band_spares_propellant_and_holds_the_formation() -> None:
     spent = {}
     for band in (0.0, 20.0):
         plant = {"duration": 17400.0, "deputy1.relative_state": [0.0, -100.0, 0.0, 0.0, 0.0, 0.0]}
-        overrides = {"/plant": plant, "/**/controller": {"dead_band": [band] * 3}}
+        overrides: dict[str, dict[str, Any]] = {"/plant": plant, "/**/controller": {"dead_band": [band] * 3}}
         run, records = Run(load_scenario("leader_follower", overrides)), dict[str, Any]()
         total, worst = 0.0, 0.0
         while not run.plant.finished:

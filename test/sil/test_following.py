@@ -73,7 +73,7 @@ def test_each_deputy_follows_its_own_part_of_the_plant() -> None:
 
 
 def test_a_value_that_is_given_wins_and_the_difference_is_told() -> None:
-    overrides = {
+    overrides: dict[str, dict[str, Any]] = {
         "/plant": {"deputy1.sensors.radius.sigma": 10.0, "tick": 1.0},
         "/deputy1/navigation": {"radius_sigma": 5.0, "sensors": ["radius", "latitude"]},
         "/**/controller": {"mass": 90.0, "tick": 2.0},
