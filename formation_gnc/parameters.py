@@ -48,6 +48,8 @@ class Limits:
     """Number of values of an array; None for any."""
     in_flight: bool = False
     """Whether it may change in flight."""
+    follows: str = ""
+    """The plant's parameter whose value it has unless it is given: see :mod:`formation_gnc.sil.following`."""
 
     def allowed(self) -> str:
         """Allowed values in words."""
@@ -148,6 +150,14 @@ class Leaf:
             raise self._rejection(value, limits.allowed())
         if kind in (int, float) and not (limits.minimum <= value <= limits.maximum and value > limits.above):
             raise self._rejection(value, limits.allowed())
+        return value
+
+    def nearest(self, value: Any) -> Any:
+        """A number, or each of a list, moved into the inclusive range."""
+        if _is_list(value):
+            return tuple(map(self.nearest, value))
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            return min(max(value, self.limits.minimum), self.limits.maximum)
         return value
 
     def _rejection(self, value: Any, allowed: str) -> ParameterError:

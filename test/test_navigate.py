@@ -26,8 +26,9 @@ def recorded(path: Path, change_at: int = -1, **navigation: Any) -> Path:
         "deputy1.sensors.outage_start": 300.0,
         "deputy1.sensors.outage_duration": 100.0,
     }
+    used = {"sensors": ["radius", "range_rate", "latitude"]}  # one less than there are
     scenario = load_scenario(
-        "leader_follower", {"/plant": {"duration": 600.0, **trouble}, "/**/navigation": navigation}
+        "leader_follower", {"/plant": {"duration": 600.0, **trouble}, "/**/navigation": used | navigation}
     )
     parameters = {
         f"parameters {node}": {name: json.dumps(value) for name, value in values.items()}

@@ -45,6 +45,8 @@ INTRODUCTION = f"""\
 Every parameter of every node, from the schemas that the nodes themselves check by. SI units and radians.
 
 - What is not given has its default; what has none must be given. `DEPUTY` stands for each name in `deputies`.
+- A parameter whose default is the plant's has the value that the plant has in the same file; so do those of every
+  node. One that is given another value keeps it, and a warning at the start says both.
 - A value that is not allowed or not finite is rejected with the reason, and so is a name that is not known.
 - A parameter that may change in flight does so at the first tick after it was set (`ros2 param set`), or at
   the one that `schedule` foresees. Any other is rejected once the node runs.
@@ -82,6 +84,8 @@ def _table(rows: list[Leaf]) -> Iterator[str]:
 
 
 def _default(leaf: Leaf) -> str:
+    if leader := leaf.limits.follows.format(deputy="DEPUTY", fleet="DEPUTY"):
+        return f"the plant's `{leader}`"
     if leaf.default is MISSING:
         return "none"
     value = list(leaf.default) if isinstance(leaf.default, tuple) else leaf.default

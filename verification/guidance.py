@@ -78,14 +78,12 @@ def flown(starts: Array, common: CommonParameters, forces: Forces) -> Array:
     return np.array(history).transpose(1, 0, 2)
 
 
-def own_flight(starts: Array, model: str, common: CommonParameters, carried: list[TargetPath]) -> Array:
+def own_flight(starts: Array, common: CommonParameters, carried: list[TargetPath]) -> Array:
     """(satellites, N, 6) free flight of `starts` under the target's own model, step by step."""
     instants = times(common)
-    step = float(instants[1])
-    linear = HillModel(common.mean_motion) if model == "hill" else carried[0].model  # type: ignore[attr-defined]
     states, history = starts, [starts]
     for instant in instants[:-1]:
-        states = states @ linear.transition(float(instant), step).T
+        states = carried[0].coast(states, float(instant), instants[1:2])[0]
         history.append(states)
     return np.array(history).transpose(1, 0, 2)
 
@@ -119,7 +117,7 @@ def drifts(directory: Path) -> tuple[str, list[Figure]]:
                 off = {
                     label: np.linalg.norm((flight - targets)[..., :3], axis=2).max(axis=0)
                     for label, flight in (
-                        ("own", own_flight(targets[:, 0], model, common, carried)),
+                        ("own", own_flight(targets[:, 0], common, carried)),
                         ("two-body", flown(targets[:, 0], common, point_mass)),
                         ("J2", flown(targets[:, 0], common, oblate)),
                     )

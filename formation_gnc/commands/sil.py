@@ -81,7 +81,7 @@ def run(options: argparse.Namespace) -> int:
     if bag.exists():
         raise ConfigurationError(f"bag {bag}: exists already; name a directory that does not")
     console = Console(stderr=True, highlight=False)
-    for warning in process_noise_warnings(scenario):
+    for warning in (*scenario.departures(), *process_noise_warnings(scenario)):
         console.print(f"warning: {warning}", soft_wrap=True)
     on_graph = partial(_fly_on_graph, composed=options.composed, display=options.display)
     try:

@@ -65,7 +65,10 @@ class Controller[P](ABC):
         """
 
     def activate(self, handover: Handover) -> None:  # noqa: B027 - optional for stateless laws
-        """Initialise from the law that was active before; called once, before the first `command`."""
+        """Initialise from the law that was active before: before the first `command`, and after a dead band.
+
+        A law that comes back from its dead band is handed over by itself, without a state.
+        """
 
     @abstractmethod
     def command(self, estimate: NavigationState, target: Target) -> Command:

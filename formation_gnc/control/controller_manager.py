@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
+from formation_gnc.control.dead_band import is_tolerated
 from formation_gnc.control.registry import ALGORITHMS
 from formation_gnc.errors import ParameterError
 from formation_gnc.flight.module import Configuration, FlightModule, ModuleParameters
@@ -20,9 +21,16 @@ class ControllerParameters(ModuleParameters):
     """Parameters of the controller node: those common to all laws, and each law's own under its name."""
 
     algorithm: str = parameter("lqr", choices=ALGORITHMS, in_flight=True, doc="active control law")
-    mass: float = parameter(100.0, unit="kg", above=0.0, doc="initial mass of the deputy, for the design")
+    mass: float = parameter(
+        100.0, follows="{deputy}.mass", unit="kg", above=0.0, doc="initial mass of the deputy, for the design"
+    )
     thrust_limit: tuple[float, ...] = parameter(
-        (0.01, 0.01, 0.01), unit="N", length=3, minimum=0.0, doc="largest force per Hill axis"
+        (0.01, 0.01, 0.01),
+        follows="{deputy}.thrusters.limit",
+        unit="N",
+        length=3,
+        minimum=0.0,
+        doc="largest force per Hill axis",
     )
     handover_step: float = parameter(
         0.1,
@@ -32,14 +40,24 @@ class ControllerParameters(ModuleParameters):
         doc="largest step in force when the law changes, as a share of thrust_limit; the rest of the change "
         "follows at one such step per tick",
     )
+    dead_band: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0),
+        unit="m",
+        length=3,
+        minimum=0.0,
+        in_flight=True,
+        doc="position error per Hill axis that is tolerated: no thrust from when free motion stays within it for a "
+        "revolution until it is left; 0 on an axis for no dead band",
+    )
     laws: Mapping[str, Any] = per_entry(ALGORITHMS)
 
     def __post_init__(self) -> None:
-        """Raise ParameterError for a thrust limit of zero on every axis."""
+        """Raise ParameterError for a thrust limit of zero on every axis, unless no thrust is wanted."""
         super().__post_init__()
-        if not any(self.thrust_limit):
+        if not any(self.thrust_limit) and self.algorithm != "coast":
             raise ParameterError(
-                f"parameter thrust_limit: {list(self.thrust_limit)} is not allowed; one axis must push"
+                f"parameter thrust_limit: {list(self.thrust_limit)} is not allowed; "
+                "one axis must push, or algorithm be coast"
             )
 
 
@@ -48,7 +66,7 @@ class ControllerManager(FlightModule[ControllerParameters, Controller[Any]]):
 
     The thrust is finite and within its limit for any input and any output of the law; the status reports
     every intervention. When the law changes, the step in force beyond `handover_step` is withheld, then
-    released at that rate.
+    released at that rate. Within the dead band the law is not evaluated, and begins anew when it is left.
     """
 
     def reset(self) -> None:
@@ -57,6 +75,8 @@ class ControllerManager(FlightModule[ControllerParameters, Controller[Any]]):
         self._predecessor: str | None = None
         self._withheld = [0.0, 0.0, 0.0]
         self._fallback = ""
+        self._is_silent = False
+        """Whether the law was silent, within the dead band, at the tick before."""
 
     def design(self, parameters: ControllerParameters) -> Controller[Any]:
         """Design the law named by `algorithm`; raises DesignError as that law."""
@@ -102,8 +122,17 @@ class ControllerManager(FlightModule[ControllerParameters, Controller[Any]]):
         if not 0.0 < estimate.mass < inf:
             reason = f"mass is {estimate.mass:g} kg; it must be positive and finite: no thrust"
             return Command(np.zeros(3), fallback=reason)
+        error = (estimate.relative_state - target.relative_state).tolist()
+        law, was_silent = self.configuration.design, self._is_silent
+        band, rate = self.parameters.dead_band, self.parameters.mean_motion
+        self._is_silent = is_tolerated(error, band, rate, was_silent)
+        if self._is_silent:
+            self._withheld = [0.0, 0.0, 0.0]
+            return Command(np.zeros(3), solver="dead band")
+        if was_silent:
+            law.activate(Handover(np.zeros(3), self.parameters.algorithm))
         try:
-            command = self.configuration.design.command(estimate, target)
+            command = law.command(estimate, target)
         except (ArithmeticError, ValueError) as error:  # LinAlgError is a ValueError
             return Command(np.zeros(3), fallback=f"{type(error).__name__}: {error}: no thrust")
         if not all(map(isfinite, command.force.tolist())):

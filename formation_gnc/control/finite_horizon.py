@@ -145,7 +145,8 @@ class FiniteHorizonController[P: FiniteHorizonParameters](Controller[P]):
         }
 
     def activate(self, handover: Handover) -> None:
-        """Continue the reconfiguration of a law of the same class."""
+        """Continue the reconfiguration of a law of the same class, or begin one."""
+        self._current = None
         if type(handover.law) is type(self):
             self._current, self._target = handover.law._current, handover.law._target
 

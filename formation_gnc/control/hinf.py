@@ -222,7 +222,7 @@ class HInfinityController(Controller[HinfParameters]):
 
     def activate(self, handover: Handover) -> None:
         """Start from the force commanded before."""
-        self._force = handover.force
+        self._force, self._states, self.recovery.state = handover.force, None, None
 
     def command(self, estimate: NavigationState, target: Target) -> Command:
         """Output of the controller, whose states advance by a tick, plus the recovery's acceleration."""

@@ -242,7 +242,8 @@ class ModelPredictiveController(Controller[MpcParameters]):
         return self.fallback_law.linear(time)
 
     def activate(self, handover: Handover) -> None:
-        """Limit the thrust rate from the force commanded before."""
+        """Plan anew; limit the thrust rate from the force commanded before."""
+        self.plan = np.empty((0, 3))
         if self._rate is not None:
             self._rate.previous = handover.force
 

@@ -67,6 +67,9 @@ class Row:
         return self.gives[0]
 
 
+PLANT = "/plant"
+"""Full name of the plant's node."""
+
 NAVIGATION_STATE = Input(topics.ESTIMATE, NavigationState)
 
 MODULES: dict[str, Row] = {}

@@ -18,6 +18,8 @@ class Formation[P](ABC):
     """
 
     Parameters: ClassVar[type]
+    is_given: ClassVar[bool] = False
+    """Whether its slots are states that somebody gives, in the Cartesian Hill frame, not a shape."""
 
     @abstractmethod
     def __init__(self, parameters: P, mean_motion: float, slot: int = 0) -> None:
@@ -39,7 +41,14 @@ class Formation[P](ABC):
 
     @abstractmethod
     def states(self, times: Vector) -> Matrix:
-        """(N, 6) relative states, Hill frame, m and m/s, at times (N,) in s since the start of the run."""
+        """(N, 6) relative states, m and m/s, at times (N,) in s since the start of the run.
+
+        In the coordinates of Hill's equations, which at large separations are curvilinear.
+        """
+
+    def about(self, chief: Vector) -> "Formation[P]":
+        """The formation about a chief with an inertial state (6,) at time zero: itself, where it is a shape."""
+        return self
 
 
 class FreeMotion[P](Formation[P]):

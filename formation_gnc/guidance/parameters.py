@@ -43,7 +43,11 @@ class GuidanceParameters(ModuleParameters):
         "weighted by the inverse of the propellant left",
     )
     dry_masses: tuple[float, ...] = parameter(
-        (), unit="kg", minimum=0.0, doc="dry mass of each satellite of the fleet, for assignment by fuel"
+        (),
+        follows="{fleet}.thrusters.dry_mass",
+        unit="kg",
+        minimum=0.0,
+        doc="dry mass of each satellite of the fleet, for assignment by fuel",
     )
     separation_warning: float = parameter(
         0.0,
@@ -64,6 +68,7 @@ class GuidanceParameters(ModuleParameters):
     )
     thrust_limit: tuple[float, ...] = parameter(
         (0.01, 0.01, 0.01),
+        follows="{deputy}.thrusters.limit",
         unit="N",
         length=3,
         minimum=0.0,

@@ -63,7 +63,7 @@ def predict(
             neighbours[:, index] = neighbour_paths[name].states(time + ahead)
     planned = np.vstack([target.relative_state, target.preview])[:, None] - neighbours
     later: Vector = np.linspace(0.0, horizon * math.tau / mean_motion, math.ceil(horizon * POINTS) + 1)
-    passive = path.coast(state - target.neighbours, time, later)
+    passive = path.coast(state[None], time, later) - path.coast(target.neighbours, time, later)
     near, far = _nearest(planned, ahead), _nearest(passive, later)
     return Separation(
         target.time,

@@ -51,7 +51,7 @@ def design_path(parameters: GuidanceParameters) -> TargetPath:
     orbit = np.linspace(0.0, math.tau / parameters.mean_motion, 8)
     with np.errstate(all="ignore"):
         path = slot_path(parameters, parameters.slot, parameters.phase)
-        furthest = np.abs(path.states(orbit)[:, :3]).max()
+        furthest = np.abs(path.curvilinear(orbit)[:, :3]).max()
     if not furthest < MAX_RANGE:  # keeps every later target finite
         raise ConfigurationError(
             f"formation {parameters.formation}: its parameters put a target {furthest:g} m away; "

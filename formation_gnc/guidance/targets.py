@@ -5,13 +5,15 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from copy import copy
 from functools import partial
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from formation_gnc.common import CommonParameters
 from formation_gnc.errors import OrbitError
+from formation_gnc.guidance.curvilinear import curvilinear_from_hill, hill_from_curvilinear
 from formation_gnc.guidance.formation import Formation
+from formation_gnc.orbit.constants import MU
 from formation_gnc.orbit.elements import (
     Elements,
     elements_from_state,
@@ -33,26 +35,40 @@ class TargetPath(ABC):
     """Target of a deputy at any time of the run: a formation from a phase at time zero, propagated by one model.
 
     The phase refers to time zero of the run, not to the time of a change. So deputies that change formation,
-    size or slot at different times are in formation again.
+    size or slot at different times are in formation again. Formations and models are in curvilinear coordinates,
+    targets in the Cartesian Hill frame.
     """
 
     def __init__(self, formation: Formation[Any], phase: float, common: CommonParameters) -> None:
         """Propagate `formation`, prepared for the mean motion of `common`, from `phase` (rad) at time zero."""
-        self._formation, self._phase, self._common = formation, phase, common
+        self._chief, self._chief_time = state_from_elements(common.chief_elements), 0.0
+        self._given, self._phase, self._common = formation, phase, common
+        self._formation = formation.about(self._chief)
         self._ahead = phase / common.mean_motion
 
-    def anchored(self, chief: Vector, time: float) -> "TargetPath":
+    def anchored(self, chief: Vector, time: float) -> Self:
         """The path about the orbit that the chief's inertial state (6,) at a time (s) is on; the same without one."""
-        return self
+        if not _is_on_ellipse(chief):
+            return self
+        path = copy(self)
+        path._chief, path._chief_time = chief, time
+        return path
 
-    @abstractmethod
     def states(self, times: Vector) -> Matrix:
         """(N, 6) target states, Hill frame, m and m/s, at times (N,) in s since the start of the run."""
+        return hill_from_curvilinear(self.curvilinear(times), self._chief, times - self._chief_time, MU)
+
+    @abstractmethod
+    def curvilinear(self, times: Vector) -> Matrix:
+        """As `states`, in curvilinear coordinates."""
 
     def coast(self, states: Matrix, time: float, ahead: Vector) -> Matrix:
         """(K, N, 6) states of free motion in the model from states (N, 6) at a time (s), after times (K,) s."""
-        moved: Matrix = (self._transitions(time, ahead) @ states.T).swapaxes(1, 2)
-        return moved
+        now = time - self._chief_time
+        start = curvilinear_from_hill(states, self._chief, np.full(len(states), now), MU)
+        moved = (self._transitions(time, ahead) @ start.T).swapaxes(1, 2)
+        later = np.repeat(now + ahead, len(states))
+        return hill_from_curvilinear(moved.reshape(-1, 6), self._chief, later, MU).reshape(moved.shape)
 
     @abstractmethod
     def _transitions(self, time: float, ahead: Vector) -> Matrix:
@@ -98,10 +114,16 @@ def _advanced(orbit: Elements, time: float) -> Vector:
     )
 
 
+def _is_on_ellipse(chief: Vector) -> bool:
+    x, y, z, vx, vy, vz = map(float, chief)
+    radius, square = math.sqrt(x * x + y * y + z * z), vx * vx + vy * vy + vz * vz
+    return 0.0 < radius * square < 2.0 * MU  # false for what is not finite
+
+
 class HillPath(TargetPath):
     """The formation's own states, which are solutions of Hill's equations about a circular orbit."""
 
-    def states(self, times: Vector) -> Matrix:
+    def curvilinear(self, times: Vector) -> Matrix:
         """(N, 6) states of the formation."""
         return self._formation.states(np.asarray(times) + self._ahead)
 
@@ -134,24 +156,26 @@ class ModelPath(TargetPath):
     def _start_in(self, model: LinearModel) -> Vector:
         """(6,) state at time zero in a model."""
         n, (in_plane, across) = self._common.mean_motion, model.phase_rates(0.0)
-        given = self._formation.states(np.array([self._ahead]))[0]
+        given: Vector = self._formation.states(np.array([self._ahead]))[0]
+        drift = given[4] + 2.0 * n * given[0]
+        if self._formation.is_given and abs(given[4] - model.bounded(0.0, given)[4]) < abs(drift):
+            return given
         start: Vector = model.bounded(0.0, given * np.array([1.0, 1.0, 1.0, in_plane / n, 1.0, across / n]))
-        start[4] += given[4] + 2.0 * n * given[0]
+        start[4] += drift
         return start
 
-    def states(self, times: Vector) -> Matrix:
+    def curvilinear(self, times: Vector) -> Matrix:
         """(N, 6) states by the model's transition matrices."""
         return self._transitions(0.0, times) @ self._start
 
-    def anchored(self, chief: Vector, time: float) -> TargetPath:
+    def anchored(self, chief: Vector, time: float) -> Self:
         """With the same constants of motion about the orbit that the chief is seen on."""
-        model = self.model.anchored(chief, time)
-        if model is self.model:
-            return self  # a model without a perigee
+        path, model = super().anchored(chief, time), self.model.anchored(chief, time)
+        if path is self or model is self.model:
+            return path  # a model without a perigee, or a chief without an orbit
         if self._reference is None:
             first = self.model.anchored(state_from_elements(self._common.chief_elements), 0.0)
             self._reference = first, self._start_in(first)
-        path = copy(self)
         path.model, path._start = model, model.continued(self._reference[1], self._reference[0])
         return path
 
@@ -161,7 +185,7 @@ class ModelPath(TargetPath):
     def error(self) -> tuple[float, float]:
         """As `TargetPath.error`; of Hill's path where the model has J2, which the reference has not."""
         if self.model.has_j2:
-            return HillPath(self._formation, self._phase, self._common).error()
+            return HillPath(self._given, self._phase, self._common).error()
         return super().error()
 
 

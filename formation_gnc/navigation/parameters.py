@@ -18,7 +18,10 @@ def _sigmas() -> Iterator[tuple[str, Any, Any]]:
     for sensor in sensors().values():
         least, greatest = sensor.sigma_range
         doc = f"standard deviation of the {sensor.title} reading"
-        kind, field = sensor.declare(sensor.sigma, minimum=least, maximum=greatest, in_flight=True, doc=doc)
+        follows = f"{{deputy}}.sensors.{sensor.name}.sigma"
+        kind, field = sensor.declare(
+            sensor.sigma, minimum=least, maximum=greatest, in_flight=True, doc=doc, follows=follows
+        )
         yield f"{sensor.name}_sigma", kind, field
 
 
@@ -43,7 +46,8 @@ class NavigationParameters(ModuleParameters):
         doc="power density of the unmodelled acceleration, each axis",
     )
     sensors: tuple[str, ...] = parameter(
-        ("radius", "range_rate", "latitude"),
+        tuple(name for name, sensor in sensors().items() if sensor.on),
+        follows="{deputy}.sensors.*.on",
         in_flight=True,
         doc=f"sensors whose readings are used, of {', '.join(sensors())}",
     )
@@ -54,10 +58,16 @@ class NavigationParameters(ModuleParameters):
         "when all three are there",
     )
     fix_position_sigma: float = parameter(
-        0.5, unit="m", minimum=1e-6, maximum=1e6, doc="standard deviation of an acquisition fix, each axis"
+        0.5,
+        follows="{deputy}.sensors.fix_position_sigma",
+        unit="m",
+        minimum=1e-6,
+        maximum=1e6,
+        doc="standard deviation of an acquisition fix, each axis",
     )
     fix_velocity_sigma: float = parameter(
         0.0005,
+        follows="{deputy}.sensors.fix_velocity_sigma",
         unit="m/s",
         minimum=1e-9,
         maximum=1e3,

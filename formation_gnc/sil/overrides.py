@@ -8,6 +8,7 @@ import yaml
 from formation_gnc.errors import ConfigurationError, nearest
 from formation_gnc.flight.graph import MODULES
 from formation_gnc.parameters import read_yaml
+from formation_gnc.sil.following import SHARED
 
 FORM = "NODE.PARAMETER=VALUE, as controller.algorithm=mpc"
 
@@ -16,7 +17,8 @@ def overrides_of(entries: Iterable[str]) -> dict[str, dict[str, Any]]:
     """Values by node pattern and dotted name, those of all deputies before those of one.
 
     NODE is `plant`, the name of a module for that of every deputy, `DEPUTY/MODULE`, or a pattern that begins
-    with a slash, as in a parameter file. A value given twice is the later one.
+    with a slash, as in a parameter file. What all nodes share is set for all of them with `plant`. A value given
+    twice is the later one.
 
     Raises:
         ConfigurationError: an entry has another form, an unknown node or no YAML value.
@@ -27,7 +29,8 @@ def overrides_of(entries: Iterable[str]) -> dict[str, dict[str, Any]]:
         node, dot, name = target.strip().partition(".")
         if not (equals and dot and node and name):
             raise ConfigurationError(f"set {entry!r}: is not allowed; it must be like {FORM}")
-        overrides.setdefault(_pattern(node, entry), {})[name] = parse_value(name, text)
+        pattern = "/**" if node == "plant" and name in SHARED else _pattern(node, entry)
+        overrides.setdefault(pattern, {})[name] = parse_value(name, text)
     return dict(sorted(overrides.items(), key=lambda item: "*" not in item[0]))
 
 

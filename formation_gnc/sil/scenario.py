@@ -6,7 +6,7 @@ import os
 import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -14,23 +14,28 @@ import yaml
 
 import formation_gnc
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.flight.graph import GRAPH
+from formation_gnc.flight.graph import GRAPH, PLANT
 from formation_gnc.parameter_yaml import RejectedYamlError
 from formation_gnc.parameters import dump, load, read_yaml
 from formation_gnc.plant.parameters import PlantParameters
+from formation_gnc.sil.following import SHARED, departures, with_followed
 
 SECTION = "ros__parameters"
 
-RUN_NODES = ("/plant", "/recorder", "/display", "/replay")
+RUN_NODES = (PLANT, "/recorder", "/display", "/replay")
 """Nodes that are one per run, some only when asked."""
 
-DEFAULT_DEPUTIES = next(field.default for field in fields(PlantParameters) if field.name == "deputies")
+DEFAULT_DEPUTIES = next(each.default for each in fields(PlantParameters) if each.name == "deputies")
 
 MOST_NAMED = 12
 """Nodes that an error names at most."""
 
 NODE = re.compile(r"/?([A-Za-z0-9_]+|\*\*?)(/([A-Za-z0-9_]+|\*\*?))*")
 """Names of nodes and patterns of them that ROS takes in a parameter file."""
+
+
+type Sections = list[tuple[str, Mapping[str, Any]]]
+"""Patterns of nodes with values by dotted name, in the order in which they are given."""
 
 
 @dataclass(frozen=True)
@@ -41,17 +46,29 @@ class Scenario:
     plant: PlantParameters
     deputies: Mapping[str, Mapping[str, Any]]
     """Parameters of every deputy's modules, by deputy and module."""
+    others: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    """What the run's other nodes are given, by full name, unchecked; what all share is the plant's."""
 
     def parameters(self) -> dict[str, dict[str, Any]]:
         """All parameters by full node name, then by dotted name."""
-        nodes: dict[str, Any] = {"/plant": self.plant}
+        nodes: dict[str, Any] = {PLANT: self.plant}
         for name, modules in self.deputies.items():
             nodes |= {f"/{name}/{module}": values for module, values in modules.items()}
         return {node: dump(values) for node, values in nodes.items()}
 
+    def departures(self) -> list[str]:
+        """A line for each node with parameters that differ from the plant's, which they follow by default."""
+        plant = dump(self.plant)
+        found = {
+            f"/{deputy}/{module}": departures(values, plant, deputy)
+            for deputy, modules in self.deputies.items()
+            for module, values in modules.items()
+        }
+        return [f"{node}: {'; '.join(words)}" for node, words in found.items() if words]
+
     def text(self, extra: Mapping[str, Mapping[str, Any]] | None = None) -> str:
         """The scenario as a ROS 2 parameter file, nothing left to defaults and `extra` on top of it."""
-        nodes = self.parameters()
+        nodes = self.parameters() | {node: dict(values) for node, values in self.others.items()}
         for node, values in (extra or {}).items():
             nodes[node] = nodes.get(node, {}) | dict(values)
         document = {
@@ -67,32 +84,45 @@ def _plain(value: Any) -> Any:
 
 
 def load_scenario(name: str, overrides: Mapping[str, Mapping[str, Any]] | None = None) -> Scenario:
-    """Read and check a scenario.
+    """Read and check a scenario; what modules are not given is as the plant has it.
 
     Args:
         name: of a scenario in `params/`, or the path of a parameter file.
         overrides: parameters that go before the file's, by node pattern such as ``/**/controller``.
 
     Raises:
-        ConfigurationError: no such scenario, an unreadable file, or a parameter that is not allowed.
+        ConfigurationError: no such scenario, an unreadable file, a section or override of no node, or a parameter
+            that is not allowed.
     """
     from formation_gnc.guidance.fleet_checks import check_fleet  # nodes that only read their section need no guidance
 
     path = find_scenario(name)
-    written = _sections(path)
-    sections = [*written, *(overrides or {}).items()]
-    listed = _given(sections, "/plant").get("deputies", DEFAULT_DEPUTIES)
-    _check_sections(path, written, listed if isinstance(listed, list | tuple) else ())
+    written, overriding = _sections(path), list((overrides or {}).items())
+    sections = [*written, *overriding]
+    listed = _given(sections, PLANT).get("deputies", DEFAULT_DEPUTIES)
+    deputies = listed if isinstance(listed, list | tuple) else ()
+    _check_sections(str(path), written, deputies, RUN_NODES)
+    _check_sections(f"{path.name}: overrides", overriding, deputies, (PLANT,))
     try:
-        plant = _load(PlantParameters, sections, "/plant")
-        deputies = {
-            deputy: {row.name: _load(row.parameters, sections, f"/{deputy}/{row.name}") for row in GRAPH}
-            for deputy in plant.deputies
-        }
-        check_fleet({name: modules["guidance"] for name, modules in deputies.items()})
+        plant = _load(PlantParameters, _given(sections, PLANT), PLANT)
+        modules = {deputy: _load_modules(sections, dump(plant), deputy) for deputy in plant.deputies}
+        check_fleet({deputy: each["guidance"] for deputy, each in modules.items()})
     except ConfigurationError as error:
         raise ConfigurationError(f"{path.name}: {error}") from None
-    return Scenario(path.stem, plant, deputies)
+    given = {node: _given(sections, node) for node in RUN_NODES if node != PLANT}
+    own = {node: {name: each for name, each in values.items() if name not in SHARED} for node, values in given.items()}
+    return Scenario(path.stem, plant, modules, {node: values for node, values in own.items() if values})
+
+
+def _load_modules(sections: Sections, plant: Mapping[str, Any], deputy: str) -> dict[str, Any]:
+    """Parameters of a deputy's modules, by module."""
+    loaded = {}
+    for row in GRAPH:
+        node = f"/{deputy}/{row.name}"
+        loaded[row.name] = _load(
+            row.parameters, with_followed(row.parameters, _given(sections, node), plant, deputy), node
+        )
+    return loaded
 
 
 def find_scenario(name: str) -> Path:
@@ -117,14 +147,14 @@ def given_to(path: Path, node: str, deputies: Sequence[str]) -> dict[str, Any]:
         ConfigurationError: the file cannot be read, is no ROS 2 parameter file, or has a section of no node.
     """
     sections = _sections(path)
-    _check_sections(path, sections, deputies)
+    _check_sections(str(path), sections, deputies, RUN_NODES)
     return _given(sections, node)
 
 
-def _check_sections(path: Path, sections: Sequence[tuple[str, Any]], deputies: Sequence[Any]) -> None:
-    """Raise ConfigurationError for a section of a file that means no node of a run with these deputies."""
+def _check_sections(source: str, sections: Sections, deputies: Sequence[Any], run_nodes: Sequence[str]) -> None:
+    """Raise ConfigurationError for a section that means neither one of `run_nodes` nor a deputy's node."""
     modules = [f"/{deputy}/{row.name}" for deputy in deputies for row in GRAPH]
-    nodes = [*RUN_NODES, *modules]
+    nodes = [*run_nodes, *modules]
     patterns = [*nodes, *(f"/**/{row.name}" for row in GRAPH)]
     unknown = [
         f"{pattern} (did you mean {_nearest(pattern, patterns)}?)"
@@ -133,7 +163,7 @@ def _check_sections(path: Path, sections: Sequence[tuple[str, Any]], deputies: S
     ]
     if unknown:
         names = ", ".join(nodes if len(nodes) <= MOST_NAMED else [*nodes[:MOST_NAMED], "..."])
-        raise ConfigurationError(f"{path}: sections of no node: {', '.join(unknown)}; the run has {names}")
+        raise ConfigurationError(f"{source}: sections of no node: {', '.join(unknown)}; the run has {names}")
 
 
 def _nearest(pattern: str, patterns: Sequence[str]) -> str:
@@ -141,7 +171,7 @@ def _nearest(pattern: str, patterns: Sequence[str]) -> str:
     return difflib.get_close_matches(f"/{pattern.strip('/')}", patterns, n=1, cutoff=0.0)[0]
 
 
-def sections_given_to(path: Path, names: Collection[str]) -> list[tuple[str, Mapping[str, Any]]]:
+def sections_given_to(path: Path, names: Collection[str]) -> Sections:
     """Sections of a parameter file for a node that has these names: pattern of nodes, and values by dotted name."""
     return [(pattern, section) for pattern, section in _sections(path) if any(matches(pattern, name) for name in names)]
 
@@ -155,14 +185,14 @@ def _directories() -> Iterator[Path]:
         yield Path(prefix) / "share" / "formation_gnc" / "params"
 
 
-def _load(schema: Any, sections: list[tuple[str, Mapping[str, Any]]], node: str) -> Any:
+def _load(schema: Any, values: Mapping[str, Any], node: str) -> Any:
     try:
-        return load(schema, _given(sections, node))
+        return load(schema, values)
     except ConfigurationError as error:
         raise ConfigurationError(f"{node}: {error}") from None
 
 
-def _given(sections: list[tuple[str, Mapping[str, Any]]], node: str) -> dict[str, Any]:
+def _given(sections: Sections, node: str) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for pattern, section in sections:
         if matches(pattern, node):
@@ -178,7 +208,7 @@ def matches(pattern: str, node: str) -> bool:
     return re.fullmatch(expression, node) is not None
 
 
-def _sections(path: Path) -> list[tuple[str, Mapping[str, Any]]]:
+def _sections(path: Path) -> Sections:
     """Node patterns of a parameter file with their parameters by dotted name, in the file's order."""
     try:
         document = read_yaml(path.read_text())

@@ -6,7 +6,7 @@ from typing import Any
 
 from formation_gnc.flight import topics
 from formation_gnc.flight.barrier import Decision, TickBarrier
-from formation_gnc.flight.graph import GRAPH
+from formation_gnc.flight.graph import GRAPH, PLANT
 from formation_gnc.plant.parameters import PlantParameters
 from formation_gnc.plant.plant import Plant
 from formation_gnc.records import Clock, Event, EventKind, Thrust
@@ -17,8 +17,6 @@ Sink = Callable[[str, Any], None]
 
 RECORDER_LAG = topics.QUEUE_DEPTH // 4
 """Ticks that the plant may be ahead of the recorder: well inside what the queues hold."""
-
-PLANT = "/plant"
 
 
 class Simulation:

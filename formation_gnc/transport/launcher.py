@@ -8,19 +8,16 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
-from typing import Any
 
 import domain_coordinator
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 
-from formation_gnc.flight.graph import MODULES
-from formation_gnc.parameters import dump
+from formation_gnc.flight.graph import MODULES, PLANT
 from formation_gnc.sil.plant_executive import RECORDER
 from formation_gnc.sil.report import Report
 from formation_gnc.sil.scenario import Scenario
-from formation_gnc.sil.simulation import PLANT
 from formation_gnc.transport.diagnostics import subscribe_to_reports
 from formation_gnc.transport.processes import Graph, NodeDied, NodeProcess
 
@@ -141,8 +138,6 @@ def _start(graph: Graph, scenario: Scenario, options: LaunchOptions, directory: 
     """Start every node of a scenario; returns the plant's."""
     file = directory / f"{scenario.name}.yaml"
     extra = {PLANT: {"wait_for_recorder": options.bag is not None}}
-    if options.bag:
-        extra[RECORDER] = _common(scenario)
     file.write_text(scenario.text(extra))
     arguments = ["--params-file", str(file)]
     if options.bag:
@@ -154,8 +149,3 @@ def _start(graph: Graph, scenario: Scenario, options: LaunchOptions, directory: 
     if options.display:
         graph.start("/display", arguments)
     return plant
-
-
-def _common(scenario: Scenario) -> dict[str, Any]:
-    """Common parameters for the recorder: the same as every node's."""
-    return {name: value for name, value in dump(scenario.plant).items() if name == "tick" or name.startswith("chief.")}

@@ -22,9 +22,11 @@ except ImportError:  # missing in other builds of Jazzy; slower, same behaviour
     EventsExecutor = SingleThreadedExecutor
 
 from formation_gnc.errors import ConfigurationError
+from formation_gnc.flight.graph import PLANT
 from formation_gnc.flight.topics import QUEUE_DEPTH
 from formation_gnc.parameters import OWN_OF_ROS, Leaf, change, dump, leaves, load, read_yaml
 from formation_gnc.records import WARNINGS, Event, EventKind
+from formation_gnc.sil.following import departures, values_of_plant, with_followed
 from formation_gnc.transport.conversion import codec, message_type
 from formation_gnc.transport.parameter_arguments import given_parameters, without_parameters
 from formation_gnc.transport.process import stop_requested
@@ -45,7 +47,8 @@ class ConfiguredNode(Node):  # type: ignore[misc]
 
     `values` is the schema's instance. A parameter that the schema does not know or allow raises
     ConfigurationError, as does a later change of it, with the same words, through the parameter service. One that
-    is given to all nodes and belongs to another is left out, with a warning.
+    is given to all nodes and belongs to another is left out, with a warning. One that is not given, and follows the
+    plant's, has the value that the same files give the plant; one that differs from it is warned of.
 
     Names of topics are those within the formation, whatever namespace it is in (:meth:`full_name`).
     """
@@ -63,7 +66,11 @@ class ConfiguredNode(Node):  # type: ignore[misc]
         self._set_those_of_ros(given.take(OWN_OF_ROS))
         for foreign, source in given.drop_foreign(schema).items():
             self.get_logger().warning(f"parameter {foreign}, given to all nodes by {source}: none of mine, ignored")
-        self.values: Any = load(schema, given.values)
+        plant = values_of_plant(given_parameters(sys.argv, (self.full_name(PLANT), PLANT)).values)
+        deputy = full_name.split("/")[-2] if namespace else ""
+        self.values: Any = load(schema, with_followed(schema, given.values, plant, deputy))
+        for difference in departures(self.values, plant, deputy):
+            self.get_logger().warning(difference)
         settled = dump(self.values)
         self._leaves = {leaf.name: leaf for leaf in leaves(schema, settled)}
         for leaf in self._leaves.values():

@@ -67,8 +67,8 @@ def test_radial_amplitude_about_an_eccentric_chief_is_the_formations(
     about = common(e, anomaly)
     n = about.mean_motion
     target = path("yamanaka_ankersen", name, about, phase)
-    start = path("hill", name, about, phase).states(np.array([0.0]))[0]
-    x = target.states(np.linspace(0.0, math.tau / n, 50))[:, 0]
+    start = path("hill", name, about, phase).curvilinear(np.array([0.0]))[0]
+    x = target.curvilinear(np.linspace(0.0, math.tau / n, 50))[:, 0]
     assert np.abs(x).max() <= np.hypot(start[0], start[3] / n) * (1.0 + 1e-9) + 1e-9
 
 

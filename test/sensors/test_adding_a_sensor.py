@@ -160,6 +160,7 @@ def test_the_report_draws_a_new_sensor(flight: Any) -> None:
 
 def test_the_reference_lists_the_parameters_of_a_new_sensor(flight: Any) -> None:
     page = flight["reference"]
-    assert "| `relative_position_sigma` | double array | m | `[0.5, 0.5, 1.0]` | 3 values, at least 0.001" in page
+    followed = "the plant's `DEPUTY.sensors.relative_position.sigma`"
+    assert f"| `relative_position_sigma` | double array | m | {followed} | 3 values, at least 0.001" in page
     assert "| `DEPUTY.sensors.relative_position.bias` | double array | m | `[0.0, 0.0, 0.0]` | 3 values" in page
     assert "| `DEPUTY.sensors.relative_position.on` | bool |  | `false` |" in page

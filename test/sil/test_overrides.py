@@ -21,8 +21,30 @@ def test_overrides_reach_the_node_that_they_name() -> None:
     assert (scenario.plant.seed, scenario.plant.tick, controller.tick) == (7, 2.0, 2.0)
 
 
+def test_what_all_nodes_share_is_set_for_all_with_the_plants() -> None:
+    scenario = load_scenario("leader_follower", overrides_of(["plant.tick=2", "plant.chief.eccentricity=0.01"]))
+    for each in (scenario.plant, *scenario.deputies["deputy1"].values()):
+        assert (each.tick, each.chief.eccentricity) == (2.0, 0.01)
+
+
 def test_the_later_of_two_values_counts() -> None:
     assert overrides_of(["plant.seed=1", "plant.seed=2"]) == {"/plant": {"seed": 2}}
+
+
+@pytest.mark.parametrize(
+    ("entry", "words"),
+    [
+        ("deputy9/controller.algorithm=mpc", "/deputy9/controller (did you mean /deputy1/controller?); the run has /p"),
+        ("/*/controler.algorithm=mpc", "/*/controler (did you mean /**/controller?)"),
+        ("/recorder.snapshot=1.0", "/recorder (did you mean"),
+        ("/deputy9/**.tick=2.0", "/deputy9/** (did you mean /deputy1/"),
+    ],
+)
+def test_an_override_of_no_node_is_rejected_like_a_section(entry: str, words: str) -> None:
+    with pytest.raises(ConfigurationError) as rejection:
+        load_scenario("leader_follower", overrides_of([entry]))
+    assert str(rejection.value).startswith("leader_follower.yaml: overrides: sections of no node: ")
+    assert words in str(rejection.value)
 
 
 @pytest.mark.parametrize(

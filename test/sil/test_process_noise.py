@@ -3,7 +3,7 @@
 import pytest
 
 from formation_gnc.sil.process_noise import process_noise_warnings, unmodelled_density
-from formation_gnc.sil.scenario import load_scenario
+from formation_gnc.sil.scenario import find_scenario, load_scenario
 
 
 def test_a_truth_with_j2_alone_asks_for_no_process_noise() -> None:
@@ -19,7 +19,7 @@ def test_differential_sunlight_asks_for_the_square_of_its_acceleration() -> None
 
 
 @pytest.mark.parametrize(
-    "scenario", ["leader_follower", "geostationary", "eccentric_leo", "tetrahedral", "projected_circle"]
+    "scenario", sorted(path.stem for path in find_scenario("leader_follower").parent.glob("*.yaml"))
 )
 def test_shipped_scenarios_have_the_process_noise_that_they_need(scenario: str) -> None:
     assert process_noise_warnings(load_scenario(scenario)) == []

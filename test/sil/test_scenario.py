@@ -148,6 +148,14 @@ def test_a_scenario_written_and_read_again_is_the_same(tmp_path: Path) -> None:
     assert load_scenario(str(tmp_path / "leader_follower.yaml")) == scenario
 
 
+def test_sections_of_recorder_and_display_are_handed_on(write: Write, tmp_path: Path) -> None:
+    path = write(GOOD + "/display: {ros__parameters: {trail: 100.0}}\n")
+    text = load_scenario(str(path)).text({"/recorder": {"bag": "here"}})
+    (tmp_path / "again.yaml").write_text(text)
+    again = load_scenario(str(tmp_path / "again.yaml"))
+    assert again.others == {"/display": {"trail": 100.0}, "/recorder": {"bag": "here"}}
+
+
 def test_namespaces_may_be_nested_and_parameters_too(write: Write) -> None:
     path = write("""
         /**: {ros__parameters: {chief: {semi_major_axis: 7.0e6}, chief.inclination: 0.5}}
