@@ -124,7 +124,8 @@ class _SensorNoise:
         found, state = self._found()
         if self.factor == 1.0:
             latest, expected = self._found(LEAST)
-            self.factor = max(1.0, found.variance - state, latest.variance - expected)
+            within = (self.white - self.state) / max(1, len(self.terms))
+            self.factor = max(1.0, found.variance - state, latest.variance - expected, within)
             while len(self.recent) > LEAST:
                 self.recent.popleft()
             self._restart_terms()
@@ -133,12 +134,6 @@ class _SensorNoise:
             self.factor = 1.0 if is_well else max(1.0, found.variance - state)
             if is_well:
                 self._restart_terms()
-
-    def forget(self) -> None:
-        """Forget all readings, not the noise found."""
-        self.recent.clear()
-        self.last = []
-        self._restart_terms()
 
     def _restart_terms(self) -> None:
         self.terms.clear()
@@ -245,9 +240,9 @@ class AdaptiveNoise:
         return 2 * sum(white) >= len(white)
 
     def forget_readings(self) -> None:
-        """Forget the innovations so far, which an inflation has explained as an error of the state."""
+        """Forget the innovations so far, also beyond the gate, which an inflation explains as an error of the state."""
         for sensor in self._sensors.values():
-            sensor.forget()
+            sensor.recent.clear()
 
     def _estimate(self, name: str, sensor: _SensorNoise) -> None:
         sensor.estimate()
