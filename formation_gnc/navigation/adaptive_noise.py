@@ -6,6 +6,7 @@ successive innovations is the variance of the white part alone (von Neumann 1941
 """
 
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cache
 from math import sqrt
@@ -13,15 +14,20 @@ from math import sqrt
 import numpy as np
 from scipy.special import chdtri
 
-from formation_gnc.navigation.kernels.linear_algebra import accumulate_information, restore_definiteness
+from formation_gnc.navigation.kernels.contributions import update_contributions
+from formation_gnc.navigation.kernels.linear_algebra import accumulate_transition, restore_definiteness
 from formation_gnc.navigation.measurement import Readings
+from formation_gnc.navigation.robust_scale import ALIKE, WhiteNoise, white_noise
 from formation_gnc.types import Matrix, Vector
 
+JUDGED = 20
+"""Innovations of each sensor that a NIS which is too large is judged by."""
+
 WINDOW = 60
-"""Differences of innovations over which a sensor's noise is averaged: a standard error of a ninth, of sigma."""
+"""Innovations over which a sensor's noise is averaged: a standard error of a ninth, of sigma."""
 
 LEAST = 12
-"""Differences before anything is concluded."""
+"""Innovations before anything is concluded."""
 
 FALSE_ALARM = 1e-6
 """Probability that the window of a sensor as noisy as its parameter says counts as noisier."""
@@ -29,7 +35,10 @@ FALSE_ALARM = 1e-6
 SUSPICION = 1e-3
 """The same once the NIS of all sensors is too large, so that there is something to explain."""
 
-GROWTH = 1.5
+MEMORY = 1.0 - 1.0 / WINDOW
+"""Factor, at each reading, on what a sensor's older readings contribute to the covariance that is corrected."""
+
+GROWTH = 1.2
 """Growth of the factor beyond which the readings so far have been weighted too much."""
 
 RETURN = 1.2
@@ -38,73 +47,104 @@ RETURN = 1.2
 REPORTED_AGAIN = 2.0
 """Change of the standard deviation, as a factor, after which it is reported again."""
 
+_LARGEST = 1e9
+"""Innovations are cut to so many standard deviations, whose squares are finite."""
+
 
 @dataclass(slots=True)
 class _SensorNoise:
-    """Window of a sensor; squared differences and predictions are over the variance that the parameter says."""
+    """Windows of a sensor."""
 
+    place: int
+    """In the order in which sensors came up."""
     factor: float = 1.0
     """Estimated variance of the noise, over that of the parameter; one or more."""
     last: list[float] = field(default_factory=list)
-    terms: deque[tuple[float, float, int]] = field(default_factory=deque)
+    terms: deque[tuple[float, float, float]] = field(default_factory=deque)
+    """Of readings within the gate, over the variance of the noise: half the squared difference, predicted variance and
+    square."""
     white: float = 0.0
     """Sum of half the squared differences."""
     state: float = 0.0
     """Sum of the variances of the expected readings."""
-    beyond: int = 0
-    """Readings beyond the gate in the window."""
-    new_beyond: int = 0
-    """Of these, since the last reading within."""
+    recent: deque[tuple[list[float], float]] = field(default_factory=lambda: deque(maxlen=WINDOW))
+    """Of all readings, over what the parameter says: innovations, and the variance of what was expected."""
     reported: float = 1.0
     believed: float = 1.0
     """Factor that the covariance reckons with."""
-    information: Matrix = field(default_factory=lambda: np.zeros((6, 6)))
-    """Of the readings in the window of observability, by the weight that each has had, over the factor then."""
 
     def add(self, values: list[float], variance: float, state: float) -> None:
-        """Add a reading's innovations, with the mean variance of the noise and that of the expected values."""
+        """Add a reading's innovations within the gate, with the mean variance of noise and of expected values."""
         last, self.last = self.last, values
         if len(last) != len(values):
             return
-        white = sum((new - old) ** 2 for new, old in zip(values, last, strict=True)) / (2.0 * variance * len(values))
+        unit = variance * len(values)
+        white = sum((new - old) ** 2 for new, old in zip(values, last, strict=True)) / (2.0 * unit)
         terms = self.terms
-        terms.append((white, state / variance, self.new_beyond))
-        self.beyond += self.new_beyond
-        self.new_beyond = 0
+        terms.append((white, state / variance, sum(each * each for each in values) / unit))
         self.white += white
         self.state += state / variance
         if len(terms) > WINDOW:
-            old_white, old_state, old_beyond = terms.popleft()
-            self.beyond -= old_beyond
+            old_white, old_state, _ = terms.popleft()
             self.white -= old_white
             self.state -= old_state
 
+    def remember(self, values: list[float], variance: list[float], state: float) -> None:
+        """Remember a reading, also one beyond the gate."""
+        units = [min(max(each / sqrt(own), -_LARGEST), _LARGEST) for each, own in zip(values, variance, strict=True)]
+        self.recent.append((units, state * len(variance) / sum(variance)))
+
     def is_noisy(self, false_alarm: float) -> bool:
-        """Whether the window has more white noise than the parameter predicts."""
+        """Whether the readings within the gate have more white noise than the parameter predicts."""
         count = len(self.terms)
         return count >= LEAST and self.white > _largest_ratio(count, false_alarm) * (count + self.state)
+
+    def is_noisy_beyond_gate(self, false_alarm: float) -> bool:
+        """The same of all readings but outliers."""
+        if len(self.recent) < LEAST:
+            return False
+        found, state = self._found()
+        count = len(found.kept) - 1
+        return found.is_white and found.variance > _largest_ratio(count, false_alarm) * (1.0 + state)
+
+    def _found(self, count: int = WINDOW) -> tuple[WhiteNoise, float]:
+        """Noise of the last readings, and the mean variance of what was expected."""
+        recent = list(self.recent)[-count:]
+        found = white_noise(np.array([values for values, _ in recent]))
+        return found, sum(recent[place][1] for place in found.kept) / len(found.kept)
 
     @property
     def is_learning(self) -> bool:
         """Whether the noise is larger than the parameter says, and not yet averaged over a whole window."""
-        return self.factor > 1.0 and len(self.terms) < WINDOW
+        return self.factor > 1.0 and len(self.recent) < WINDOW
 
-    def estimate(self, gate: float) -> None:
-        """Take the factor from the window.
-
-        The gate, a square as in `reading_update`, has cut the innovations of a sensor that is found noisier: how many
-        are beyond it says how wide they spread, and its window starts again.
-        """
-        count = len(self.terms)
+    def estimate(self) -> None:
+        """Take the factor from the readings; the first from the last few, too, which the window then starts with."""
+        count = len(self.recent)
+        found, state = self._found()
         if self.factor == 1.0:
-            share = self.beyond / (self.beyond + count)
-            spread = gate / chdtri(1, share) if share > 0.0 else 1.0
-            self.factor = max(1.0, (self.white - self.state) / count, spread)
-            self.terms.clear()
-            self.white, self.state, self.beyond = 0.0, 0.0, 0
+            latest, expected = self._found(LEAST)
+            within = (self.white - self.state) / max(1, len(self.terms))
+            self.factor = max(1.0, found.variance - state, latest.variance - expected, within)
+            while len(self.recent) > LEAST:
+                self.recent.popleft()
+            self._restart_terms()
         elif count >= LEAST:
-            is_well = count >= WINDOW and self.white <= RETURN * (count + self.state)
-            self.factor = 1.0 if is_well else max(1.0, (self.white - self.state) / count)
+            is_well = count >= WINDOW and found.variance <= RETURN * (1.0 + state)
+            self.factor = 1.0 if is_well else max(1.0, found.variance - state)
+            if is_well:
+                self._restart_terms()
+
+    def _restart_terms(self) -> None:
+        self.terms.clear()
+        self.white, self.state = 0.0, 0.0
+
+    def is_white(self, count: int) -> bool:
+        """Whether the last readings, also beyond the gate, differ from one to the next as much as they spread."""
+        values = np.array([values for values, _ in list(self.recent)[-count:]])
+        if len(values) < count:
+            return False
+        return float(np.mean(np.diff(values, axis=0) ** 2)) / 2.0 > ALIKE * float(np.mean(values**2))
 
 
 class AdaptiveNoise:
@@ -114,8 +154,12 @@ class AdaptiveNoise:
         """Every sensor as its parameter says."""
         self._sensors: dict[str, _SensorNoise] = {}
         self._noisy: dict[str, float] = {}
-        self._excess = np.zeros((6, 6))
-        self._has_grown = False
+        self._contributions = np.zeros((0, 6, 6))
+        """(s, 6, 6) of the recent readings of each sensor to the covariance after the last update."""
+        self._transition = np.eye(6)
+        """(6, 6) since then."""
+        self._excess: dict[str, float] = {}
+        """Growth of the contribution of each sensor that the covariance is to be corrected by."""
 
     def scaled(self, variance: dict[str, tuple[float, ...]]) -> dict[str, tuple[float, ...]]:
         """Variances of the noise of each value by sensor, as they are found to be; the argument while all are well."""
@@ -123,83 +167,111 @@ class AdaptiveNoise:
             return variance
         return {name: tuple(each * self._noisy.get(name, 1.0) for each in values) for name, values in variance.items()}
 
+    def propagate(self, transition: Matrix) -> None:
+        """Propagate by a transition matrix (6, 6)."""
+        accumulate_transition(self._transition, transition)
+
     def add(
-        self,
-        readings: Readings,
-        innovation: Vector,
-        variance: Vector,
-        jacobian: Matrix,
-        transition: Matrix,
-        gate: float,
+        self, readings: Readings, innovation: Vector, variance: Vector, jacobian: Matrix, covariance: Matrix
     ) -> None:
-        """Add readings within the gate.
+        """Add readings within the gate, after the update with them.
 
         Args:
             readings: with m values in all.
             innovation: (m,).
             variance: predicted, of each innovation, (m,).
             jacobian: (m, 6).
-            transition: (6, 6), since the start of the window of observability.
-            gate: largest accepted innovation squared over its variance.
+            covariance: (6, 6) after the update.
         """
         values, total, noise = innovation.tolist(), variance.tolist(), readings.variance.tolist()
+        places = np.empty(readings.model.size, dtype=np.int64)
         for name, rows in zip(readings.model.sensors, readings.model.rows, strict=True):
-            sensor = self._sensors.setdefault(name, _SensorNoise())
+            sensor = self._sensor(name)
+            places[rows] = sensor.place
+            own, state = _split(noise[rows], total[rows], sensor.factor)
+            sensor.remember(values[rows], own, state)
             size = rows.stop - rows.start
-            own = sum(noise[rows]) / size
-            sensor.add(values[rows], own / sensor.factor, sum(total[rows]) / size - own)
-            weight = readings.variance[rows] * sensor.factor
-            accumulate_information(sensor.information, jacobian[rows], transition, weight)
+            mean = sum(noise[rows]) / size
+            sensor.add(values[rows], mean, sum(total[rows]) / size - mean)
+        update_contributions(
+            self._contributions, places, MEMORY, self._transition, covariance, jacobian, readings.variance
+        )
+        self._transition = np.eye(6)
+        for name in readings.model.sensors:
+            sensor = self._sensors[name]
             if sensor.factor > 1.0 or sensor.is_noisy(FALSE_ALARM):
-                self._estimate(name, sensor, gate)
-        if self._has_grown:  # one noisy sensor casts suspicion on the others: corrected together
-            self.explains_excess(gate)
+                self._estimate(name, sensor)
+        if self._excess:  # one noisy sensor casts suspicion on the others: corrected together
+            self.explains_excess()
 
-    def reject(self, sensor: str) -> None:
-        """Count a reading beyond the gate."""
-        self._sensors.setdefault(sensor, _SensorNoise()).new_beyond += 1
+    def reject(self, name: str, values: list[float], noise: list[float], total: list[float]) -> None:
+        """Add a reading beyond the gate: innovations, variances of the noise, and predicted ones of the innovations."""
+        sensor = self._sensor(name)
+        own, state = _split(noise, total, sensor.factor)
+        sensor.remember(values, own, state)
+        if sensor.factor > 1.0 or sensor.is_noisy_beyond_gate(FALSE_ALARM):
+            self._estimate(name, sensor)
 
-    def explains_excess(self, gate: float) -> bool:
-        """Whether sensors noisier than their parameters explain a NIS that is too large; their noise is adapted."""
-        is_explained = False
+    def _sensor(self, name: str) -> _SensorNoise:
+        sensor = self._sensors.get(name)
+        if sensor is None:
+            sensor = self._sensors[name] = _SensorNoise(len(self._sensors))
+            self._contributions = np.concatenate([self._contributions, np.zeros((1, 6, 6))])
+        return sensor
+
+    def explains_excess(self) -> bool:
+        """Whether noise or outliers explain a NIS that is too large; noise found is adapted.
+
+        They do if at least half of the excess is white.
+        """
+        terms = [term for sensor in self._sensors.values() for term in list(sensor.terms)[-JUDGED:]]
+        white, state, square = map(sum, zip(*terms, strict=True)) if terms else (0.0, 0.0, 0.0)
+        predicted = len(terms) + state
+        is_explained = white - predicted >= 0.5 * (square - predicted)
         for name, sensor in self._sensors.items():
-            if sensor.factor == 1.0 and sensor.is_noisy(SUSPICION):
-                self._estimate(name, sensor, gate)
+            if sensor.factor == 1.0 and (sensor.is_noisy(SUSPICION) or sensor.is_noisy_beyond_gate(SUSPICION)):
+                self._estimate(name, sensor)
             is_explained |= sensor.is_learning
         return is_explained
 
-    def _estimate(self, name: str, sensor: _SensorNoise, gate: float) -> None:
-        sensor.estimate(gate)
+    def are_white(self, names: Iterable[str], count: int) -> bool:
+        """Whether the last innovations of most of these sensors are white: noise or outliers, no error of the state."""
+        white = [self._sensor(name).is_white(count) for name in names]
+        return 2 * sum(white) >= len(white)
+
+    def forget_readings(self) -> None:
+        """Forget the innovations so far, also beyond the gate, which an inflation explains as an error of the state."""
+        for sensor in self._sensors.values():
+            sensor.recent.clear()
+
+    def _estimate(self, name: str, sensor: _SensorNoise) -> None:
+        sensor.estimate()
         if sensor.factor > 1.0:
             self._noisy[name] = sensor.factor
             if sensor.factor > GROWTH * sensor.believed:
-                self._has_grown = True
-                self._excess += (sensor.factor - sensor.believed) * sensor.information
+                self._excess[name] = self._excess.get(name, 1.0) * sensor.factor / sensor.believed
                 sensor.believed = sensor.factor
         else:
             self._noisy.pop(name, None)
             sensor.believed = 1.0
 
-    def correct(self, covariance: Matrix, transition: Matrix) -> Matrix:
+    def correct(self, covariance: Matrix) -> Matrix:
         """Covariance (6, 6) with the errors of readings that were weighted too much.
 
-        An estimate that gave readings of information M the weight of one variance, which was f times as large,
-        errs by P' = P + (f - 1) P M P. `transition` (6, 6) is that since the start of the window.
+        A sensor whose noise has f times the variance that its readings were weighted with contributes f times as
+        much as it was taken to: P' = P + (f - 1) C.
         """
-        if not self._has_grown:
+        if not self._excess:
             return covariance
-        self._has_grown = False
-        seen = np.linalg.solve(transition, covariance)  # Phi^-1 P
-        corrected: Matrix = covariance + seen.T @ self._excess @ seen
-        self._excess = np.zeros((6, 6))
-        self.begin_window()
+        growth = np.zeros((6, 6))
+        for name, factor in self._excess.items():
+            place = self._sensors[name].place
+            growth += (factor - 1.0) * self._contributions[place]
+            self._contributions[place] *= factor
+        self._excess = {}
+        corrected: Matrix = covariance + self._transition @ growth @ self._transition.T
         restore_definiteness(corrected)
         return corrected
-
-    def begin_window(self) -> None:
-        """Begin another window of observability, to whose start information refers."""
-        for sensor in self._sensors.values():
-            sensor.information = np.zeros((6, 6))
 
     def take_reports(self) -> list[tuple[str, str]]:
         """Subject and detail of each change of a sensor's noise that is worth an event."""
@@ -215,6 +287,11 @@ class AdaptiveNoise:
                 detail = f"noise {sigma:.2g} times {name}_sigma: weighted so" if is_noisy else "noise as assumed again"
                 reports.append((name, detail))
         return reports
+
+
+def _split(noise: list[float], total: list[float], factor: float) -> tuple[list[float], float]:
+    """Variances of the noise as the parameter says, and the mean variance of the expected values."""
+    return [each / factor for each in noise], (sum(total) - sum(noise)) / len(noise)
 
 
 @cache

@@ -38,9 +38,16 @@ class Consistency:
         """Without a history."""
         self._nis: deque[float] = deque(maxlen=WINDOW)
         self._freedom: deque[int] = deque(maxlen=WINDOW)
-        self._rejected = 0
+        self._rejected = self._inflations = 0
 
-    def judge(self, nis: float, used: int, rejected: int, explains_excess: Callable[[], bool]) -> tuple[Verdict, float]:
+    def judge(
+        self,
+        nis: float,
+        used: int,
+        rejected: int,
+        explains_excess: Callable[[], bool],
+        are_white: Callable[[], bool],
+    ) -> tuple[Verdict, float]:
         """Judge an update.
 
         Args:
@@ -48,17 +55,18 @@ class Consistency:
             used: number of these, the degrees of freedom of their NIS.
             rejected: number of values rejected by the gates.
             explains_excess: whether noisier sensors explain a NIS that is too large.
+            are_white: whether the rejected readings are noise or outliers, since they are not alike.
 
         Returns:
             The verdict, and the factor by which to inflate the covariance.
         """
         if rejected > used:
             self._rejected += 1
-            inflations = self._rejected - UPDATES_TO_DIVERGE
-            if inflations < 0:
+            if self._rejected < UPDATES_TO_DIVERGE or are_white():
                 return Verdict.CONSISTENT, 1.0
-            return (Verdict.GIVE_UP if inflations >= INFLATIONS else Verdict.INFLATE), INFLATION
-        self._rejected = 0
+            self._inflations += 1
+            return (Verdict.GIVE_UP if self._inflations > INFLATIONS else Verdict.INFLATE), INFLATION
+        self._rejected = self._inflations = 0
         self._nis.append(nis)
         self._freedom.append(used)
         total, freedom = sum(self._nis), sum(self._freedom)

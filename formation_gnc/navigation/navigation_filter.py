@@ -7,7 +7,7 @@ import numpy as np
 
 from formation_gnc.flight.module import Configuration, FlightModule
 from formation_gnc.navigation.adaptive_noise import AdaptiveNoise
-from formation_gnc.navigation.consistency import Verdict
+from formation_gnc.navigation.consistency import UPDATES_TO_DIVERGE, Verdict
 from formation_gnc.navigation.filter_state import Design, FilterState, acquire, expected_observability
 from formation_gnc.navigation.filters import FILTERS, filterpy
 from formation_gnc.navigation.kernels.linear_algebra import are_finite
@@ -199,10 +199,9 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         state.history.add(interval)
         state.time += step.nanoseconds
         words = state.observability.words
-        if state.observability.propagate(transition, step.seconds):
-            state.noise.begin_window()
-            if state.observability.words != words:
-                self._report_observability(state)
+        state.noise.propagate(transition)
+        if state.observability.propagate(transition, step.seconds) and state.observability.words != words:
+            self._report_observability(state)
 
     def _acceleration(self, state: FilterState, measurement: Measurement) -> Vector:
         """Acceleration by thrust over the tick that has ended; zero where it is not plausible."""
@@ -230,11 +229,15 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         """Update with the readings, and check consistency; none when the state is lost."""
         result = self._update(state, measurement)
         if result is not None:
-            gate = self.configuration.design.gate
+            rejected = [each.sensor for each in result.innovations if each.rejection]
             verdict, factor = state.consistency.judge(
-                result.nis, result.used, result.rejected, lambda: state.noise.explains_excess(gate)
+                result.nis,
+                result.used,
+                result.rejected,
+                state.noise.explains_excess,
+                lambda: state.noise.are_white(rejected, UPDATES_TO_DIVERGE),
             )
-            state.filter.covariance = state.noise.correct(state.filter.covariance, state.observability.transition)
+            state.filter.covariance = state.noise.correct(state.filter.covariance)
             if verdict is Verdict.GIVE_UP:
                 self._lose(measurement.time, "readings contradict the state, however uncertain")
                 return None
@@ -242,6 +245,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
                 return self._estimate(self._acquire(measurement), measurement, EstimateStatus.ACQUIRED)
             if verdict is Verdict.INFLATE:
                 state.filter.covariance = state.observability.inflate(state.filter.covariance, factor)
+                state.noise.forget_readings()
                 self.log(measurement.time, EventKind.DIVERGED, f"covariance inflated by {factor:.3g}")
                 status = EstimateStatus.DIVERGED
         if status is EstimateStatus.TRACKING:

@@ -58,11 +58,11 @@ def update(state: FilterState, readings: Readings, gate: float, pseudo: bool, re
     if within is None:
         return UpdateResult(innovations, 0.0, 0, offered)
     readings = within.readings
-    state.noise.add(readings, within.innovation, within.variance, within.jacobian, state.observability.transition, gate)
     state.observability.add(within.jacobian, readings.variance)
     nis = state.filter.update(pseudo and not readings.late and applies_to(readings.model))
     if not (are_finite(state.filter.state, state.filter.covariance) and isfinite(nis)):
         raise ArithmeticError("the update is not finite")
+    state.noise.add(readings, within.innovation, within.variance, within.jacobian, state.filter.covariance)
     state.last_reading = state.time
     final = iter(_innovations(within, gate))
     innovations = [each if each.rejection else next(final) for each in innovations] or list(final)
@@ -91,7 +91,8 @@ def _gated(
         if not passes:
             rejections.add(Rejection.GATE, innovation.sensor, f"{ratio:.1f} standard deviations off")
             innovation.rejection = Rejection.GATE
-            state.noise.reject(innovation.sensor)
+            noise, total = readings.variance[rows].tolist(), offered.variance[rows].tolist()
+            state.noise.reject(innovation.sensor, innovation.values, noise, total)
         innovations.append(innovation)
     if not any(passed):
         return None, innovations
