@@ -89,17 +89,19 @@ def _step(
     settings: Floats,
     ephemerides: Array,
     constants: Floats,
-    zonals: Array,
-    harmonics: Array,
+    field: tuple[Array, Array],
     needed: int,
     air: Array,
     step: float,
-    coupling: Array,
-    weights: Array,
-    rates: Array,
-    stage: Array,
+    scratch: tuple[Array, Array, Array, Array],
 ) -> None:
-    """Advance a state (6,) by a step; `rates` (STAGES, 6) are scratch, `stage` (6,) is left as the last stage."""
+    """Advance a state (6,) by a step.
+
+    `field` are zonals and harmonics; `scratch` are `COUPLING`, `WEIGHTS`, rates (STAGES, 6) and stage (6,), which is
+    left as the last stage.
+    """
+    zonals, harmonics = field
+    coupling, weights, rates, stage = scratch
     for i in range(STAGES):
         for c in range(6):
             change = 0.0
@@ -155,30 +157,14 @@ def _propagate_divided(
     rates, stage, after = np.empty((STAGES, 6)), np.empty(6), np.empty(6)
     parts, surface = unpack(environment), environment[SURFACE]
     constants, air = to_fixed_tuple(parts.constants, CONSTANTS), parts.air[min(satellite, len(parts.air) - 1)]
-    zonals, harmonics = parts.zonals, parts.harmonics
+    field, scratch = (parts.zonals, parts.harmonics), (coupling, weights, rates, stage)
     done, width = 0, _FINEST // 2
     while done < _FINEST:
         part, start = step * (width / _FINEST), time + step * (done / _FINEST)
         for instant in range(len(INSTANTS)):
             ephemerides_at(needed, start + INSTANTS[instant] * part, parts, ephemerides[instant])
         after[:] = state
-        _step(
-            after,
-            thrust,
-            coefficients_,
-            settings_,
-            ephemerides,
-            constants,
-            zonals,
-            harmonics,
-            needed,
-            air,
-            part,
-            coupling,
-            weights,
-            rates,
-            stage,
-        )
+        _step(after, thrust, coefficients_, settings_, ephemerides, constants, field, needed, air, part, scratch)
         if width > 1 and not _is_resolved(stage, after, 1e-3):  # what had to be divided is divided well
             width //= 2
             continue
@@ -221,9 +207,10 @@ def propagate_tick(
     # Tuples stay in registers; with arrays a tick takes a third longer.
     settings_ = to_fixed_tuple(settings, SETTINGS)
     parts, surface = unpack(environment), environment[SURFACE]
-    constants, zonals, harmonics = to_fixed_tuple(parts.constants, CONSTANTS), parts.zonals, parts.harmonics
+    constants, field = to_fixed_tuple(parts.constants, CONSTANTS), (parts.zonals, parts.harmonics)
     rates = np.empty((STAGES, 6))
     stage, before = np.empty(6), np.empty(6)
+    scratch = coupling, weights, rates, stage
     for substep in range(substeps):
         for instant in range(len(INSTANTS)):
             ephemerides_at(needed, time + (substep + INSTANTS[instant]) * step, parts, ephemerides[instant])
@@ -232,23 +219,8 @@ def propagate_tick(
             coefficients_ = to_fixed_tuple(per_mass, COEFFICIENTS)
             before[:] = states[satellite]
             now, push = states[satellite], thrust[satellite]
-            _step(
-                now,
-                push,
-                coefficients_,
-                settings_,
-                ephemerides,
-                constants,
-                zonals,
-                harmonics,
-                needed,
-                parts.air[min(satellite, len(parts.air) - 1)],
-                step,
-                coupling,
-                weights,
-                rates,
-                stage,
-            )
+            air = parts.air[min(satellite, len(parts.air) - 1)]
+            _step(now, push, coefficients_, settings_, ephemerides, constants, field, needed, air, step, scratch)
             moment[0] = step
             if _is_resolved(stage, now, 1.0):
                 comes_down = _comes_down(before, now, step, surface)
