@@ -25,3 +25,9 @@ J2, J3, J4, J5, J6 = (-sqrt(2 * n + 1) * c for n, c in NORMALISED_ZONALS.items()
 
 EARTH_ROTATION_RATE = 7.292115e-5
 """Rotation rate of the Earth in inertial space, rad/s (IERS 2010 conventions, nominal)."""
+
+ZONALS = (J2, J3, J4, J5, J6)
+"""Un-normalised zonal coefficients from degree 2."""
+
+FLATTENING = 1.0 / 298.257223563
+"""Flattening of the reference ellipsoid (WGS 84)."""

@@ -9,29 +9,34 @@ from numpy.typing import NDArray
 from formation_gnc.orbit.constants import EARTH_RADIUS, J2, MU
 from formation_gnc.orbit.jit import ANY_VECTOR, inline, kernel
 
-_J2_STRENGTH = 1.5 * J2 * MU * EARTH_RADIUS**2
+OBLATENESS = 1.5 * J2 * MU * EARTH_RADIUS**2
+"""Strength of J2, 3/2 J2 mu R^2, m^5/s^2."""
 
 
 @inline
-def oblate_acceleration(x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Acceleration by the point mass with J2, component-wise, m/s^2."""
+def oblate_acceleration(
+    x: float, y: float, z: float, mu: float = MU, oblateness: float = OBLATENESS
+) -> tuple[float, float, float]:
+    """Acceleration by the point mass with J2, component-wise, m/s^2; `oblateness` is 3/2 J2 mu R^2."""
     r2 = x * x + y * y + z * z
     r = sqrt(r2)
-    central = MU / (r2 * r)
-    oblate = _J2_STRENGTH / (r2 * r2 * r)
+    central = mu / (r2 * r)
+    oblate = oblateness / (r2 * r2 * r)
     polar = 5.0 * z * z / r2
     equatorial = -(central + oblate * (1.0 - polar))
     return x * equatorial, y * equatorial, -z * (central + oblate * (3.0 - polar))
 
 
 @inline
-def oblate_gradient(x: float, y: float, z: float) -> tuple[float, float, float, float, float, float]:
+def oblate_gradient(
+    x: float, y: float, z: float, mu: float = MU, oblateness: float = OBLATENESS
+) -> tuple[float, float, float, float, float, float]:
     """Gradient of `oblate_acceleration`: its components xx, xy, xz, yy, yz, zz, 1/s^2."""
     r2 = x * x + y * y + z * z
     r = sqrt(r2)
     r5 = r2 * r2 * r
-    central = MU / r5
-    oblate = _J2_STRENGTH / (r5 * r2)
+    central = mu / r5
+    oblate = oblateness / (r5 * r2)
     z2 = z * z
     outer = 3.0 * central + oblate * (5.0 - 35.0 * z2 / r2)
     diagonal = -central * r2 - oblate * (r2 - 5.0 * z2)

@@ -7,12 +7,12 @@ from numba import float64, int64
 from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
-from formation_gnc.orbit.constants import EARTH_RADIUS
+from formation_gnc.orbit.environment import CONSTANTS, SURFACE, ephemerides_at, surroundings, unpack
 from formation_gnc.orbit.forces.force import Floats
 from formation_gnc.orbit.forces.model import CACHE_KEY, COEFFICIENTS, SETTINGS, acceleration
 from formation_gnc.orbit.jit import ANY_MATRIX, ANY_VECTOR, inline, kernel
 from formation_gnc.orbit.runge_kutta import COUPLING, INSTANT_OF_STAGE, INSTANTS, STAGES, WEIGHTS
-from formation_gnc.orbit.sky import EPHEMERIDES, look_up
+from formation_gnc.orbit.sky import EPHEMERIDES
 
 Array = NDArray[np.float64]
 
@@ -34,6 +34,7 @@ TICK = (
     float64,
     int64,
     float64[::1],
+    float64[::1],
 )
 """Signature of the kernels of a tick. They work in place: boxing a result array costs more than the rest of the
 call."""
@@ -48,13 +49,13 @@ def over_mass(coefficients: Array, masses: Array, satellite: int, out: Array) ->
 
 
 @inline
-def _comes_down(before: Array, after: Array, step: float) -> bool:
+def _comes_down(before: Array, after: Array, step: float, surface: float) -> bool:
     """Whether a satellite is not above the surface at the end of a step, or at a perigee within it.
 
-    The perigee is the least of the cubic through distances and radial rates at both ends.
+    The surface is a sphere; the perigee is the least of the cubic through distances and radial rates at both ends.
     """
     square = after[0] * after[0] + after[1] * after[1] + after[2] * after[2]
-    if not square >= EARTH_RADIUS * EARTH_RADIUS:  # NaN included
+    if not square >= surface * surface:  # NaN included
         return True
     start_rate = before[0] * before[3] + before[1] * before[4] + before[2] * before[5]
     end_rate = after[0] * after[3] + after[1] * after[4] + after[2] * after[5]
@@ -67,7 +68,7 @@ def _comes_down(before: Array, after: Array, step: float) -> bool:
     root = sqrt(quadratic * quadratic - 3.0 * cubic * linear)  # a minimum lies within: real
     share = -linear / (quadratic + root)
     least: float = start + share * (linear + share * (quadratic + share * cubic))
-    return least < EARTH_RADIUS
+    return least < surface
 
 
 @inline
@@ -87,21 +88,29 @@ def _step(
     coefficients: Floats,
     settings: Floats,
     ephemerides: Array,
+    constants: Floats,
+    field: tuple[Array, Array],
+    needed: int,
+    air: Array,
     step: float,
-    coupling: Array,
-    weights: Array,
-    rates: Array,
-    stage: Array,
+    scratch: tuple[Array, Array, Array, Array],
 ) -> None:
-    """Advance a state (6,) by a step; `rates` (STAGES, 6) are scratch, `stage` (6,) is left as the last stage."""
+    """Advance a state (6,) by a step.
+
+    `field` are zonals and harmonics; `scratch` are `COUPLING`, `WEIGHTS`, rates (STAGES, 6) and stage (6,), which is
+    left as the last stage.
+    """
+    zonals, harmonics = field
+    coupling, weights, rates, stage = scratch
     for i in range(STAGES):
         for c in range(6):
             change = 0.0
             for j in range(i):
                 change += coupling[i, j] * rates[j, c]
             stage[c] = state[c] + step * change
-        sky = to_fixed_tuple(ephemerides[INSTANT_OF_STAGE[i]], EPHEMERIDES)
-        ax, ay, az = acceleration(settings, coefficients, sky, to_fixed_tuple(stage, 6))
+        now = to_fixed_tuple(stage, 6)
+        around = surroundings(ephemerides[INSTANT_OF_STAGE[i]], constants, needed, now, air)
+        ax, ay, az = acceleration(settings, coefficients, around, now, zonals, harmonics)
         rates[i, 0], rates[i, 1], rates[i, 2] = stage[3], stage[4], stage[5]
         rates[i, 3], rates[i, 4], rates[i, 5] = ax + thrust[0], ay + thrust[1], az + thrust[2]
     for c in range(6):
@@ -111,7 +120,18 @@ def _step(
         state[c] += step * change
 
 
-_DIVIDED = (float64[::1], ANY_VECTOR, float64[::1], float64[::1], int64, float64, float64, float64[::1])
+_DIVIDED = (
+    float64[::1],
+    ANY_VECTOR,
+    float64[::1],
+    float64[::1],
+    int64,
+    float64,
+    float64,
+    float64[::1],
+    float64[::1],
+    int64,
+)
 
 
 @kernel(_DIVIDED, CACHE_KEY)
@@ -124,6 +144,8 @@ def _propagate_divided(
     time: float,
     step: float,
     moment: Array,
+    environment: Array,
+    satellite: int,
 ) -> bool:
     """Propagate one satellite by a step in as many parts as resolve it, halved and doubled.
 
@@ -133,18 +155,21 @@ def _propagate_divided(
     settings_, coefficients_ = to_fixed_tuple(settings, SETTINGS), to_fixed_tuple(coefficients, COEFFICIENTS)
     ephemerides = np.zeros((len(INSTANTS), EPHEMERIDES))
     rates, stage, after = np.empty((STAGES, 6)), np.empty(6), np.empty(6)
+    parts, surface = unpack(environment), environment[SURFACE]
+    constants, air = to_fixed_tuple(parts.constants, CONSTANTS), parts.air[min(satellite, len(parts.air) - 1)]
+    field, scratch = (parts.zonals, parts.harmonics), (coupling, weights, rates, stage)
     done, width = 0, _FINEST // 2
     while done < _FINEST:
         part, start = step * (width / _FINEST), time + step * (done / _FINEST)
         for instant in range(len(INSTANTS)):
-            look_up(needed, start + INSTANTS[instant] * part, ephemerides[instant])
+            ephemerides_at(needed, start + INSTANTS[instant] * part, parts, ephemerides[instant])
         after[:] = state
-        _step(after, thrust, coefficients_, settings_, ephemerides, part, coupling, weights, rates, stage)
+        _step(after, thrust, coefficients_, settings_, ephemerides, constants, field, needed, air, part, scratch)
         if width > 1 and not _is_resolved(stage, after, 1e-3):  # what had to be divided is divided well
             width //= 2
             continue
         done += width
-        comes_down = _comes_down(state, after, part)
+        comes_down = _comes_down(state, after, part, surface)
         state[:] = after
         if comes_down:
             moment[0] = step * (done / _FINEST)
@@ -166,6 +191,7 @@ def propagate_tick(
     tick: float,
     substeps: int,
     moment: Array,
+    environment: Array,
 ) -> int:
     """Propagate states by a tick.
 
@@ -180,24 +206,30 @@ def propagate_tick(
     per_mass = np.zeros(COEFFICIENTS)
     # Tuples stay in registers; with arrays a tick takes a third longer.
     settings_ = to_fixed_tuple(settings, SETTINGS)
+    parts, surface = unpack(environment), environment[SURFACE]
+    constants, field = to_fixed_tuple(parts.constants, CONSTANTS), (parts.zonals, parts.harmonics)
     rates = np.empty((STAGES, 6))
     stage, before = np.empty(6), np.empty(6)
+    scratch = coupling, weights, rates, stage
     for substep in range(substeps):
         for instant in range(len(INSTANTS)):
-            look_up(needed, time + (substep + INSTANTS[instant]) * step, ephemerides[instant])
+            ephemerides_at(needed, time + (substep + INSTANTS[instant]) * step, parts, ephemerides[instant])
         for satellite in range(satellites):
             over_mass(coefficients, masses, satellite, per_mass)
             coefficients_ = to_fixed_tuple(per_mass, COEFFICIENTS)
             before[:] = states[satellite]
-            now = states[satellite]
-            _step(now, thrust[satellite], coefficients_, settings_, ephemerides, step, coupling, weights, rates, stage)
+            now, push = states[satellite], thrust[satellite]
+            air = parts.air[min(satellite, len(parts.air) - 1)]
+            _step(now, push, coefficients_, settings_, ephemerides, constants, field, needed, air, step, scratch)
             moment[0] = step
             if _is_resolved(stage, now, 1.0):
-                comes_down = _comes_down(before, now, step)
+                comes_down = _comes_down(before, now, step, surface)
             else:
                 now[:] = before
                 start = time + substep * step
-                comes_down = _propagate_divided(now, thrust[satellite], per_mass, settings, needed, start, step, moment)
+                comes_down = _propagate_divided(
+                    now, push, per_mass, settings, needed, start, step, moment, environment, satellite
+                )
             if comes_down:
                 moment[0] += substep * step
                 return satellite

@@ -1,7 +1,8 @@
-"""Low-precision ephemerides of Sun and Moon, and the Earth's rotation angle, in the J2000 frame.
+"""Compiled ephemerides of Sun and Moon, and the Earth's rotation angle, in the J2000 frame.
 
 Time is in seconds of Terrestrial Time since J2000.0 (2000-01-01 12:00 TT), positions are geocentric. Sun and
-Moon after O. Montenbruck and E. Gill, Satellite Orbits, section 3.3.2. The Earth's axis is fixed along z of
+Moon are the low-precision series of O. Montenbruck and E. Gill, Satellite Orbits, section 3.3.2, unless tables of
+`formation_gnc.orbit.ephemerides` replace them. The Earth's axis is fixed along z of
 J2000: precession and nutation (0.14 deg by 2025) are neglected, and universal time is ``TT - 69.184 s``, correct
 to a second since 2017 until the next leap second.
 """
@@ -13,11 +14,14 @@ from numpy.typing import NDArray
 
 from formation_gnc.orbit.jit import inline
 
+Array = NDArray[np.float64]
+Floats = tuple[float, ...]
+
 ASTRONOMICAL_UNIT = 149597870700.0
 """Metre, IAU 2012."""
 
-SUN, MOON, EARTH_ROTATION = 1, 2, 4
-"""Ephemerides, as bits of what a force needs."""
+SUN, MOON, EARTH_ROTATION, AIR = 1, 2, 4, 8
+"""Ephemerides and density of the air, as bits of what a force needs."""
 
 EPHEMERIDES = 8
 """Number of ephemeris values at one time: positions of Sun and Moon (3 each), m, then cosine and sine of the
@@ -26,7 +30,19 @@ Earth's rotation angle."""
 _CENTURY = 36525.0 * 86400.0
 _ARCSECOND = pi / 648000.0
 _COS_OBLIQUITY, _SIN_OBLIQUITY = cos(23.43929111 * pi / 180.0), sin(23.43929111 * pi / 180.0)
-_TT_MINUS_UT1 = 69.184
+
+ROTATION_AT_J2000, ROTATION_EXCESS = 0.7790572732640, 0.00273781191135448
+"""Earth rotation angle at 2000-01-01 12:00 UT1, and its rate in a day of UT1 beyond one turn, revolutions (IERS
+Conventions 2010, eq. 5.15)."""
+
+TT_MINUS_UT1 = 69.184
+"""Terrestrial Time less universal time, s."""
+
+SEGMENT = 2.0 * 86400.0
+"""Length of a segment of a table of ephemerides, s; segments are counted from J2000.0."""
+
+NO_TABLE = np.zeros((0, 6, 1))
+"""Table of ephemerides without segments: the series."""
 
 
 @inline
@@ -103,19 +119,65 @@ def moon(time: float) -> tuple[float, float, float]:
 
 
 @inline
-def earth_rotation_angle(time: float) -> float:
+def earth_rotation_angle(
+    time: float,
+    at_j2000: float = ROTATION_AT_J2000,
+    excess: float = ROTATION_EXCESS,
+    tt_minus_ut1: float = TT_MINUS_UT1,
+) -> float:
     """Angle from the inertial x axis to the prime meridian, rad (IERS Conventions 2010, eq. 5.15)."""
-    days = (time - _TT_MINUS_UT1) / 86400.0
-    return _turn(0.7790572732640 + 0.00273781191135448 * days + (days - floor(days)))
+    days = (time - tt_minus_ut1) / 86400.0
+    return _turn(at_j2000 + excess * days + (days - floor(days)))
 
 
 @inline
-def look_up(needed: int, time: float, ephemerides: NDArray[np.float64]) -> None:
-    """Fill the `needed` (bits) of the ephemerides at a time, s; the others keep their values."""
+def _interpolate(table: Array, first: int, time: float, coordinate: int) -> float:
+    """Chebyshev polynomial of a coordinate (x, y, z of the Sun, then of the Moon) by Clenshaw's recurrence."""
+    segment = int(time // SEGMENT) - first
+    segment = max(0, min(len(table) - 1, segment))
+    argument = 2.0 * ((time - (first + segment) * SEGMENT) / SEGMENT) - 1.0
+    ahead, here = 0.0, 0.0
+    for k in range(table.shape[2] - 1, 0, -1):
+        ahead, here = here, 2.0 * argument * here - ahead + table[segment, coordinate, k]
+    result: float = argument * here - ahead + table[segment, coordinate, 0]
+    return result
+
+
+@inline
+def sun_position(time: float, table: Array, first: int) -> tuple[float, float, float]:
+    """Position of the Sun, m, by a table (segments, 6, terms) whose first segment is `first`, or by the series."""
+    if len(table) == 0:
+        return sun(time)
+    return (
+        _interpolate(table, first, time, 0),
+        _interpolate(table, first, time, 1),
+        _interpolate(table, first, time, 2),
+    )
+
+
+@inline
+def moon_position(time: float, table: Array, first: int) -> tuple[float, float, float]:
+    """Position of the Moon, m; as `sun_position`."""
+    if len(table) == 0:
+        return moon(time)
+    return (
+        _interpolate(table, first, time, 3),
+        _interpolate(table, first, time, 4),
+        _interpolate(table, first, time, 5),
+    )
+
+
+@inline
+def look_up(needed: int, time: float, ephemerides: Array, rotation: Floats, table: Array, first: int) -> None:
+    """Fill the `needed` (bits) of the ephemerides at a time, s; the others keep their values.
+
+    `rotation` are the arguments of `earth_rotation_angle` after the time, `table` and `first` those of
+    `sun_position`.
+    """
     if needed & SUN:
-        ephemerides[0], ephemerides[1], ephemerides[2] = sun(time)
+        ephemerides[0], ephemerides[1], ephemerides[2] = sun_position(time, table, first)
     if needed & MOON:
-        ephemerides[3], ephemerides[4], ephemerides[5] = moon(time)
+        ephemerides[3], ephemerides[4], ephemerides[5] = moon_position(time, table, first)
     if needed & EARTH_ROTATION:
-        angle = earth_rotation_angle(time)
+        angle = earth_rotation_angle(time, *rotation)
         ephemerides[6], ephemerides[7] = cos(angle), sin(angle)

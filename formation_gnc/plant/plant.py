@@ -8,6 +8,7 @@ import numpy as np
 
 from formation_gnc.errors import ConfigurationError, OrbitError, ParameterError
 from formation_gnc.orbit.elements import elements_from_state, state_from_elements
+from formation_gnc.orbit.environment import Environment
 from formation_gnc.orbit.frames import (
     inertial_from_relative,
     relative_from_inertial,
@@ -45,8 +46,12 @@ class Plant:
     axes at the start of the tick, fixed in inertial space over the tick.
     """
 
-    def __init__(self, parameters: PlantParameters) -> None:
+    def __init__(self, parameters: PlantParameters, environment: Environment | None = None) -> None:
         """Place chief and deputies.
+
+        Args:
+            parameters: the run, its forces and its satellites.
+            environment: Earth, Sun, Moon and air; those that `parameters.forces` choose by default.
 
         Raises:
             ConfigurationError: an orbit that cannot be flown, or parameters that a thruster or sensor cannot have.
@@ -70,6 +75,7 @@ class Plant:
             parameters.forces,
             [parameters.chief_body, *(parameters.deputy[name] for name in parameters.deputies)],
             parameters.epoch,
+            environment,
         )
 
     def _satellite(self, name: str, deputy: DeputyParameters) -> _Satellite:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from formation_gnc.parameters import parameter
 
@@ -25,6 +25,35 @@ class Body:
     )
 
 
+class Surroundings(NamedTuple):
+    """The environment of a satellite at an instant, as compiled forces see it; SI, inertial axes.
+
+    From `formation_gnc.orbit.environment.Environment`.
+    """
+
+    sun_x: float
+    sun_y: float
+    sun_z: float
+    moon_x: float
+    moon_y: float
+    moon_z: float
+    cos_turn: float
+    sin_turn: float
+    """Cosine and sine of the Earth rotation angle."""
+    mu: float
+    radius: float
+    oblateness: float
+    """3/2 J2 mu R^2, m^5/s^2."""
+    flattening: float
+    air_rotation_rate: float
+    mu_sun: float
+    mu_moon: float
+    sun_radius: float
+    solar_pressure: float
+    density: float
+    """Of the air at the satellite, kg/m^3."""
+
+
 @dataclass(frozen=True)
 class Force:
     """A force besides the Earth's gravity and thrust: an entry of the registry.
@@ -34,7 +63,7 @@ class Force:
 
     - settings: values of `parameters`, in order, as floats;
     - coefficient: `coefficient` of the satellite over its present mass; 0 for a force without one;
-    - ephemerides: tuple of `formation_gnc.orbit.sky.EPHEMERIDES` numbers, of which those in `ephemerides` are valid;
+    - surroundings: `Surroundings`, of whose ephemerides and density those in `ephemerides` are valid;
     - state: inertial (x, y, z, vx, vy, vz), m and m/s;
 
     and returns the acceleration (ax, ay, az), inertial, m/s^2.
@@ -45,6 +74,6 @@ class Force:
     a field of `Forces`. The first is the switch: at zero or false the force does not act."""
     acceleration: Callable[..., Vector3]
     ephemerides: int = 0
-    """`SUN`, `MOON` and `EARTH_ROTATION` of `formation_gnc.orbit.sky`, as needed, or-ed."""
+    """`SUN`, `MOON`, `EARTH_ROTATION` and `AIR` of `formation_gnc.orbit.sky`, as needed, or-ed."""
     coefficient: Callable[[Body], float] | None = None
     """Property of the satellite that the force is proportional to, if any."""

@@ -2,16 +2,19 @@
 
 With V_nm and W_nm the solid harmonics of a point, the potential is ``mu / R sum (C_nm V_nm + S_nm W_nm)``.
 Derivatives of solid harmonics are solid harmonics one degree up, so every component of the acceleration is such a
-sum too, with coefficients that are computed once, at import. There is no singularity, at the poles either.
+sum too, with coefficients that are computed once. There is no singularity, at the poles either.
 """
 
 from math import factorial, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from formation_gnc.orbit.constants import EARTH_RADIUS, MU
 from formation_gnc.orbit.forces.egm2008 import MAXIMUM_DEGREE, NORMALISED_C, NORMALISED_S
 from formation_gnc.orbit.jit import inline
+
+Array = NDArray[np.float64]
 
 _SIZE = MAXIMUM_DEGREE + 2
 
@@ -22,41 +25,66 @@ for _n in range(_SIZE):
         _AHEAD[_n, _m] = (2 * _n - 1) / (_n - _m)
         _BEHIND[_n, _m] = (_n + _m - 1) / (_n - _m)
 
-# Coefficients of V and W of degree n + 1 in the acceleration that degree n makes (Montenbruck and Gill 3.33).
-_XV, _XW, _YV, _YW, _ZV, _ZW = np.zeros((6, _SIZE, _SIZE))
-for _n in range(MAXIMUM_DEGREE + 1):
-    for _m in range(_n + 1):
-        _scale = sqrt((2 - (_m == 0)) * (2 * _n + 1) * factorial(_n - _m) / factorial(_n + _m))
-        _c, _s = _scale * NORMALISED_C[_n, _m], _scale * NORMALISED_S[_n, _m]
-        _half = 1.0 if _m == 0 else 0.5
-        _XV[_n, _m + 1] -= _half * _c
-        _XW[_n, _m + 1] -= _half * _s
-        _YV[_n, _m + 1] += _half * _s
-        _YW[_n, _m + 1] -= _half * _c
-        if _m > 0:
-            _rise = 0.5 * (_n - _m + 2) * (_n - _m + 1)
-            _XV[_n, _m - 1] += _rise * _c
-            _XW[_n, _m - 1] += _rise * _s
-            _YV[_n, _m - 1] += _rise * _s
-            _YW[_n, _m - 1] -= _rise * _c
-        _ZV[_n, _m] -= (_n - _m + 1) * _c
-        _ZW[_n, _m] -= (_n - _m + 1) * _s
+
+def derivatives(cosines: Array, sines: Array) -> Array:
+    """Coefficients of the acceleration by a field (Montenbruck and Gill 3.33), computed once.
+
+    Args:
+        cosines: fully normalised C_nm by degree and order, (N + 1, N + 1), N at most `MAXIMUM_DEGREE`.
+        sines: fully normalised S_nm.
+
+    Returns:
+        (6, MAXIMUM_DEGREE + 2, MAXIMUM_DEGREE + 2): those of V and W of degree n + 1 in the x, y and z components
+        that degree n makes.
+    """
+    out = np.zeros((6, _SIZE, _SIZE))
+    xv, xw, yv, yw, zv, zw = out
+    for n in range(len(cosines)):
+        for m in range(n + 1):
+            scale = sqrt((2 - (m == 0)) * (2 * n + 1) * factorial(n - m) / factorial(n + m))
+            c, s = scale * cosines[n, m], scale * sines[n, m]
+            half = 1.0 if m == 0 else 0.5
+            xv[n, m + 1] -= half * c
+            xw[n, m + 1] -= half * s
+            yv[n, m + 1] += half * s
+            yw[n, m + 1] -= half * c
+            if m > 0:
+                rise = 0.5 * (n - m + 2) * (n - m + 1)
+                xv[n, m - 1] += rise * c
+                xw[n, m - 1] += rise * s
+                yv[n, m - 1] += rise * s
+                yw[n, m - 1] -= rise * c
+            zv[n, m] -= (n - m + 1) * c
+            zw[n, m] -= (n - m + 1) * s
+    return out
+
+
+EGM2008 = derivatives(NORMALISED_C, NORMALISED_S)
+"""`derivatives` of EGM2008."""
 
 
 @inline
 def acceleration(
-    degree: int, cos_turn: float, sin_turn: float, x: float, y: float, z: float
+    degree: int,
+    cos_turn: float,
+    sin_turn: float,
+    x: float,
+    y: float,
+    z: float,
+    mu: float = MU,
+    radius: float = EARTH_RADIUS,
+    field: Array = EGM2008,
 ) -> tuple[float, float, float]:
     """Inertial acceleration by the field up to a degree and order, central term included, m/s^2.
 
-    Position is inertial, m; `cos_turn` and `sin_turn` are of the Earth's rotation angle.
+    Position is inertial, m; `cos_turn` and `sin_turn` are of the Earth's rotation angle, `field` are `derivatives`.
     """
     x, y = cos_turn * x + sin_turn * y, cos_turn * y - sin_turn * x
     r2 = x * x + y * y + z * z
-    px, py, pz = x * EARTH_RADIUS / r2, y * EARTH_RADIUS / r2, z * EARTH_RADIUS / r2
-    square = EARTH_RADIUS * EARTH_RADIUS / r2
+    px, py, pz = x * radius / r2, y * radius / r2, z * radius / r2
+    square = radius * radius / r2
     v, w = np.empty((_SIZE, _SIZE)), np.empty((_SIZE, _SIZE))  # filled up to degree + 1, m <= n
-    v[0, 0], w[0, 0] = EARTH_RADIUS / sqrt(r2), 0.0
+    v[0, 0], w[0, 0] = radius / sqrt(r2), 0.0
     for n in range(1, degree + 2):
         before = n - 1
         for m in range(n - 1):  # orders are independent: this loop is vectorised
@@ -69,8 +97,8 @@ def acceleration(
     ax, ay, az = 0.0, 0.0, 0.0
     for n in range(degree, -1, -1):  # small terms first
         for m in range(n + 2):
-            ax += _XV[n, m] * v[n + 1, m] + _XW[n, m] * w[n + 1, m]
-            ay += _YV[n, m] * v[n + 1, m] + _YW[n, m] * w[n + 1, m]
-            az += _ZV[n, m] * v[n + 1, m] + _ZW[n, m] * w[n + 1, m]
-    scale = MU / (EARTH_RADIUS * EARTH_RADIUS)
+            ax += field[0, n, m] * v[n + 1, m] + field[1, n, m] * w[n + 1, m]
+            ay += field[2, n, m] * v[n + 1, m] + field[3, n, m] * w[n + 1, m]
+            az += field[4, n, m] * v[n + 1, m] + field[5, n, m] * w[n + 1, m]
+    scale = mu / (radius * radius)
     return scale * (cos_turn * ax - sin_turn * ay), scale * (sin_turn * ax + cos_turn * ay), scale * az

@@ -10,19 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation_gnc.errors import ConfigurationError
+from formation_gnc.orbit import sky
+from formation_gnc.orbit.atmosphere import CIRA, Nrlmsis
+from formation_gnc.orbit.environment import Environment
+from formation_gnc.orbit.ephemerides import EPHEMERIDES, de421
 from formation_gnc.orbit.forces import harmonics, zonal
 from formation_gnc.orbit.forces.egm2008 import MAXIMUM_DEGREE
-from formation_gnc.orbit.forces.force import Body, Floats, Force, Vector3
+from formation_gnc.orbit.forces.force import Body, Floats, Force, Surroundings, Vector3
 from formation_gnc.orbit.forces.registry import FORCES
 from formation_gnc.orbit.jit import inline
-from formation_gnc.orbit.sky import EARTH_ROTATION
 from formation_gnc.parameters import leaves, parameter
 
 Array = NDArray[np.float64]
 Sum = Callable[..., Vector3]
 
-_GRAVITY_SETTINGS = 2
-"""Settings of the gravity field, which come first."""
+_OWN_SETTINGS = 3
+"""Settings of `Forces` itself, which come first: the gravity field's, and the ephemerides."""
 
 
 def _with_registered_parameters[T](schema: type[T]) -> type[T]:
@@ -52,18 +55,39 @@ class Forces:
         maximum=MAXIMUM_DEGREE,
         doc="Degree and order of EGM2008 in place of the zonal harmonics; 0 leaves them in force",
     )
+    ephemeris: str = parameter(
+        "series",
+        choices=EPHEMERIDES,
+        doc="Positions of Sun and Moon: low-precision series, or JPL's DE421",
+    )
 
     def settings(self) -> Array:
-        """The fields in order, for the compiled sum.
+        """The fields in order, for the compiled sum; a choice as its number.
 
         Raises:
             ConfigurationError: a value out of its range.
         """
-        return np.array([float(leaf.check(getattr(self, leaf.name))) for leaf in leaves(type(self), {})])
+        numbers = []
+        for leaf in leaves(type(self), {}):
+            value = leaf.check(getattr(self, leaf.name))
+            numbers.append(float(list(leaf.limits.choices).index(value) if isinstance(value, str) else value))
+        return np.array(numbers)
+
+    def environment(self) -> Environment:
+        """Surroundings of the satellites with the ephemeris and the density model that are chosen.
+
+        Raises:
+            ConfigurationError: a package that they need is not installed.
+        """
+        sun, moon = de421() if self.ephemeris == "de421" else (sky.sun, sky.moon)
+        air = vars(self)  # parameters of the registered drag
+        with_nrlmsis = air["drag"] and air["density_model"] == "nrlmsis"
+        density = Nrlmsis(air["f107"], air["f107a"], air["ap"]) if with_nrlmsis else CIRA
+        return Environment(sun=sun, moon=moon, density=density)
 
     def ephemerides(self) -> int:
         """Ephemerides that the forces in use need, as bits for `formation_gnc.orbit.sky.look_up`."""
-        needed = EARTH_ROTATION if self.harmonics_degree else 0
+        needed = sky.EARTH_ROTATION if self.harmonics_degree else 0
         for force in FORCES:
             needed |= force.ephemerides if self._is_on(force) else 0
         return needed
@@ -94,10 +118,13 @@ def _switch(force: Force) -> str:
 
 
 @inline
-def _gravity_field(settings: Floats, coefficients: Floats, ephemerides: Floats, state: Floats) -> Vector3:
+def _gravity_field(settings: Floats, around: Surroundings, state: Floats, by_degree: Array, field: Array) -> Vector3:
+    x, y, z = state[:3]
+    mu, radius = around.mu, around.radius
     if settings[1] >= 2.0:
-        return harmonics.acceleration(int(settings[1]), ephemerides[6], ephemerides[7], *state[:3])
-    return zonal.acceleration(int(settings[0]), *state[:3])
+        degree, cos_turn, sin_turn = int(settings[1]), around.cos_turn, around.sin_turn
+        return harmonics.acceleration(degree, cos_turn, sin_turn, x, y, z, mu, radius, field)
+    return zonal.acceleration(int(settings[0]), x, y, z, mu, radius, around.oblateness, by_degree)
 
 
 def _add(before: Sum, force: Force, column: int, first: int) -> Sum:
@@ -105,19 +132,26 @@ def _add(before: Sum, force: Force, column: int, first: int) -> Sum:
     of_force, last = force.acceleration, first + len(force.parameters)
 
     @inline
-    def total(settings: Floats, coefficients: Floats, ephemerides: Floats, state: Floats) -> Vector3:
-        ax, ay, az = before(settings, coefficients, ephemerides, state)
+    def total(gravity: Vector3, settings: Floats, coefficients: Floats, around: Surroundings, state: Floats) -> Vector3:
+        ax, ay, az = before(gravity, settings, coefficients, around, state)
         if settings[first] != 0.0:
-            bx, by, bz = of_force(settings[first:last], coefficients[column], ephemerides, state)
+            bx, by, bz = of_force(settings[first:last], coefficients[column], around, state)
             return ax + bx, ay + by, az + bz
         return ax, ay, az
 
     return total
 
 
+@inline
+def _gravity_alone(
+    gravity: Vector3, settings: Floats, coefficients: Floats, around: Surroundings, state: Floats
+) -> Vector3:
+    return gravity
+
+
 def _sum_of_all() -> Sum:
-    total: Sum = _gravity_field
-    first = _GRAVITY_SETTINGS
+    total: Sum = _gravity_alone
+    first = _OWN_SETTINGS
     for column, force in enumerate(FORCES):
         total = _add(total, force, column, first)
         first += len(force.parameters)
@@ -127,9 +161,24 @@ def _sum_of_all() -> Sum:
 SETTINGS, COEFFICIENTS = len(list(leaves(Forces, {}))), len(FORCES)
 """Length of `Forces.settings`, and columns of `Forces.coefficients`."""
 
-acceleration = _sum_of_all()
-"""Compiled sum of gravity and all forces in use, called as `Force.acceleration` with tuples of all settings and of
-all coefficients over the present mass."""
+_sum = _sum_of_all()
+
+
+@inline
+def acceleration(
+    settings: Floats,
+    coefficients: Floats,
+    around: Surroundings,
+    state: Floats,
+    by_degree: Array,
+    field: Array,
+) -> Vector3:
+    """Compiled sum of gravity and all forces in use.
+
+    Called as `Force.acceleration`, with tuples of all settings and of all coefficients over the present mass, and
+    with the gravity field: J_n by degree, (7,), and `formation_gnc.orbit.forces.harmonics.derivatives`.
+    """
+    return _sum(_gravity_field(settings, around, state, by_degree, field), settings, coefficients, around, state)
 
 
 def _cache_key() -> str:

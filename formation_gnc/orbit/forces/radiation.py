@@ -4,7 +4,7 @@ from math import acos, asin, pi, sqrt
 
 from formation_gnc.orbit import sky
 from formation_gnc.orbit.constants import EARTH_RADIUS
-from formation_gnc.orbit.forces.force import Floats, Force, Vector3
+from formation_gnc.orbit.forces.force import Floats, Force, Surroundings, Vector3
 from formation_gnc.orbit.jit import inline
 from formation_gnc.orbit.sky import ASTRONOMICAL_UNIT
 from formation_gnc.parameters import parameter
@@ -17,7 +17,16 @@ SUN_RADIUS = 695.7e6
 
 
 @inline
-def illumination(sx: float, sy: float, sz: float, x: float, y: float, z: float) -> float:
+def illumination(
+    sx: float,
+    sy: float,
+    sz: float,
+    x: float,
+    y: float,
+    z: float,
+    earth_radius: float = EARTH_RADIUS,
+    sun_radius: float = SUN_RADIUS,
+) -> float:
     """Visible fraction of the Sun's disc: 0 in umbra, 1 in sunlight (Montenbruck and Gill 3.4.2).
 
     Sun at (sx, sy, sz) and satellite at (x, y, z), geocentric, m. Conical shadow of a spherical Earth.
@@ -25,10 +34,10 @@ def illumination(sx: float, sy: float, sz: float, x: float, y: float, z: float) 
     dx, dy, dz = sx - x, sy - y, sz - z
     distance = sqrt(dx * dx + dy * dy + dz * dz)
     r = sqrt(x * x + y * y + z * z)
-    if r <= EARTH_RADIUS:
+    if r <= earth_radius:
         return 0.0
-    sun = asin(SUN_RADIUS / distance)  # apparent radii and separation of the two discs
-    earth = asin(EARTH_RADIUS / r)
+    sun = asin(sun_radius / distance)  # apparent radii and separation of the two discs
+    earth = asin(earth_radius / r)
     apart = acos(max(-1.0, min(1.0, -(x * dx + y * dy + z * dz) / (r * distance))))
     if apart >= sun + earth:
         return 1.0
@@ -47,18 +56,32 @@ def illumination(sx: float, sy: float, sz: float, x: float, y: float, z: float) 
 
 
 @inline
-def acceleration(area_to_mass: float, sx: float, sy: float, sz: float, x: float, y: float, z: float) -> Vector3:
+def acceleration(
+    area_to_mass: float,
+    sx: float,
+    sy: float,
+    sz: float,
+    x: float,
+    y: float,
+    z: float,
+    earth_radius: float = EARTH_RADIUS,
+    sun_radius: float = SUN_RADIUS,
+    solar_pressure: float = SOLAR_PRESSURE,
+) -> Vector3:
     """Acceleration by sunlight, m/s^2; `area_to_mass` is reflectivity times area over mass, m^2/kg."""
-    light = illumination(sx, sy, sz, x, y, z)
+    light = illumination(sx, sy, sz, x, y, z, earth_radius, sun_radius)
     dx, dy, dz = x - sx, y - sy, z - sz
     square = dx * dx + dy * dy + dz * dz
-    push = light * SOLAR_PRESSURE * area_to_mass * ASTRONOMICAL_UNIT**2 / (square * sqrt(square))
+    push = light * solar_pressure * area_to_mass * ASTRONOMICAL_UNIT**2 / (square * sqrt(square))
     return push * dx, push * dy, push * dz
 
 
 @inline
-def _on_satellite(settings: Floats, coefficient: float, ephemerides: Floats, state: Floats) -> Vector3:
-    return acceleration(coefficient, ephemerides[0], ephemerides[1], ephemerides[2], *state[:3])
+def _on_satellite(settings: Floats, coefficient: float, around: Surroundings, state: Floats) -> Vector3:
+    x, y, z = state[:3]
+    sun_x, sun_y, sun_z = around.sun_x, around.sun_y, around.sun_z
+    earth, sun = around.radius, around.sun_radius
+    return acceleration(coefficient, sun_x, sun_y, sun_z, x, y, z, earth, sun, around.solar_pressure)
 
 
 RADIATION_PRESSURE = Force(

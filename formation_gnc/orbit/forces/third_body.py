@@ -1,7 +1,7 @@
 """Third-body attraction of Sun and Moon, as point masses, relative to that of the Earth."""
 
 from formation_gnc.orbit import sky
-from formation_gnc.orbit.forces.force import Floats, Force, Vector3
+from formation_gnc.orbit.forces.force import Floats, Force, Surroundings, Vector3
 from formation_gnc.orbit.jit import inline
 from formation_gnc.parameters import parameter
 
@@ -22,13 +22,13 @@ def acceleration(mu: float, bx: float, by: float, bz: float, x: float, y: float,
 
 
 @inline
-def _of_sun(settings: Floats, coefficient: float, ephemerides: Floats, state: Floats) -> Vector3:
-    return acceleration(MU_SUN, ephemerides[0], ephemerides[1], ephemerides[2], *state[:3])
+def _of_sun(settings: Floats, coefficient: float, around: Surroundings, state: Floats) -> Vector3:
+    return acceleration(around.mu_sun, around.sun_x, around.sun_y, around.sun_z, *state[:3])
 
 
 @inline
-def _of_moon(settings: Floats, coefficient: float, ephemerides: Floats, state: Floats) -> Vector3:
-    return acceleration(MU_MOON, ephemerides[3], ephemerides[4], ephemerides[5], *state[:3])
+def _of_moon(settings: Floats, coefficient: float, around: Surroundings, state: Floats) -> Vector3:
+    return acceleration(around.mu_moon, around.moon_x, around.moon_y, around.moon_z, *state[:3])
 
 
 SUN_ATTRACTION = Force({"sun": parameter(False, doc="Attraction of the Sun")}, _of_sun, sky.SUN)
