@@ -14,13 +14,16 @@ import yaml
 
 import formation_gnc
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.flight.graph import GRAPH
+from formation_gnc.flight.graph import GRAPH, MODULES
 from formation_gnc.guidance.fleet_checks import check_fleet
 from formation_gnc.parameter_yaml import RejectedYamlError
-from formation_gnc.parameters import dump, load, read_yaml
+from formation_gnc.parameters import OWN_OF_ROS, dump, leaves, load, read_yaml
 from formation_gnc.plant.parameters import PlantParameters
 
 SECTION = "ros__parameters"
+
+ALL = "**"
+"""Pattern of all nodes: what it gives a node that has no such parameter is another's, as every node has it."""
 
 RUN_NODES = ("/plant", "/recorder", "/display", "/replay")
 """Nodes that are one per run, some only when asked."""
@@ -42,6 +45,8 @@ class Scenario:
     plant: PlantParameters
     deputies: Mapping[str, Mapping[str, Any]]
     """Parameters of every deputy's modules, by deputy and module."""
+    ignored: tuple[str, ...] = ()
+    """Parameters that the file gives all nodes and none of these has."""
 
     def parameters(self) -> dict[str, dict[str, Any]]:
         """All parameters by full node name, then by dotted name."""
@@ -79,7 +84,12 @@ def load_scenario(name: str, overrides: Mapping[str, Mapping[str, Any]] | None =
     """
     path = find_scenario(name)
     written = _sections(path)
-    sections = [*written, *(overrides or {}).items()]
+    given_to_all = {name for pattern, section in written if pattern.strip("/") == ALL for name in section}
+    # What is given on top is meant for every node that it is given to.
+    on_top = (
+        (f"/{ALL}/*" if pattern.strip("/") == ALL else pattern, values) for pattern, values in (overrides or {}).items()
+    )
+    sections = [*written, *on_top]
     listed = _given(sections, "/plant").get("deputies", DEFAULT_DEPUTIES)
     _check_sections(path, written, listed if isinstance(listed, list | tuple) else ())
     try:
@@ -91,7 +101,10 @@ def load_scenario(name: str, overrides: Mapping[str, Mapping[str, Any]] | None =
         check_fleet({name: modules["guidance"] for name, modules in deputies.items()})
     except ConfigurationError as error:
         raise ConfigurationError(f"{path.name}: {error}") from None
-    return Scenario(path.stem, plant, deputies)
+    ignored = given_to_all.difference(
+        *(dump(each) for each in (plant, *(m for d in deputies.values() for m in d.values())))
+    )
+    return Scenario(path.stem, plant, deputies, tuple(sorted(name for name in ignored if not _is_of_ros(name))))
 
 
 def find_scenario(name: str) -> Path:
@@ -117,7 +130,7 @@ def given_to(path: Path, node: str, deputies: Sequence[str]) -> dict[str, Any]:
     """
     sections = _sections(path)
     _check_sections(path, sections, deputies)
-    return _given(sections, node)
+    return _given(sections, node, MODULES[node.rpartition("/")[2]].parameters)
 
 
 def _check_sections(path: Path, sections: Sequence[tuple[str, Any]], deputies: Sequence[Any]) -> None:
@@ -156,17 +169,27 @@ def _directories() -> Iterator[Path]:
 
 def _load(schema: Any, sections: list[tuple[str, Mapping[str, Any]]], node: str) -> Any:
     try:
-        return load(schema, _given(sections, node))
+        return load(schema, _given(sections, node, schema))
     except ConfigurationError as error:
         raise ConfigurationError(f"{node}: {error}") from None
 
 
-def _given(sections: list[tuple[str, Mapping[str, Any]]], node: str) -> dict[str, Any]:
+def _given(sections: Sequence[tuple[str, Mapping[str, Any]]], node: str, schema: Any = None) -> dict[str, Any]:
+    """Values for a node, without those of rclpy's own; with its schema, also without what is meant for other nodes."""
     values: dict[str, Any] = {}
+    for_all = set[str]()
     for pattern, section in sections:
         if matches(pattern, node):
             values |= section
-    return values
+            for_all = for_all | section.keys() if pattern.strip("/") == ALL else for_all - section.keys()
+    known = {leaf.name for leaf in leaves(schema, values)} if schema else values.keys()
+    return {
+        name: value for name, value in values.items() if not _is_of_ros(name) and (name in known or name not in for_all)
+    }
+
+
+def _is_of_ros(name: str) -> bool:
+    return name.startswith(OWN_OF_ROS)
 
 
 def matches(pattern: str, node: str) -> bool:

@@ -162,9 +162,12 @@ class ConfiguredNode(Node):  # type: ignore[misc]
         subscribe_to_all(self, message_type(record), self.full_name(topic), callback, depth)
 
     def subscribe_to_source(
-        self, record: type, topic: str, callback: Callable[[bytes, Information], object], depth: int = LATEST
+        self, record: type, topic: str, callback: Callable[[bytes, Information], object], depth: int = QUEUE_DEPTH
     ) -> SourceLock:
-        """As `subscribe`; where several nodes publish the topic, to the one that is heard (:class:`SourceLock`)."""
+        """As `subscribe`; where several nodes publish the topic, to the one that is heard (:class:`SourceLock`).
+
+        depth: all share it, so that a burst of other nodes' messages must not push out the one that is awaited.
+        """
         lock = SourceLock()
 
         def receive(data: bytes, about: Information) -> None:
