@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from formation_gnc.analysis.trajectory import deputies_of, event_kinds, has_messages, trajectory
+from formation_gnc.analysis.trajectory import deputies_of, event_kinds, has_messages, trajectory, truth_of
 from formation_gnc.analysis.verdict import ErrorHistory, Verdict
 from formation_gnc.flight import topics
 from formation_gnc.recording.fields import Fields
@@ -62,8 +62,8 @@ class RunFigures:
         return max((each.verdict for each in self.deputies.values()), key=list(Verdict).index)
 
 
-def commanded_delta_v(bag: Bag, deputy: str) -> tuple[Vector, Vector]:
-    """Delta-v that the controller commanded, whether or not it was applied.
+def commanded_delta_v(bag: Bag, deputy: str, truth: Fields | None = None) -> tuple[Vector, Vector]:
+    """Delta-v that the controller commanded, whether or not it was applied; `truth` as for `trajectory`.
 
     Returns:
         (N,) time, s, and (N,) delta-v up to the end of that tick, all axes added, m/s.
@@ -71,7 +71,7 @@ def commanded_delta_v(bag: Bag, deputy: str) -> tuple[Vector, Vector]:
     topic = topics.THRUST.of(deputy)
     if not has_messages(bag, topic):
         return np.zeros(0), np.zeros(0)
-    thrust, truth = bag.arrays(topic, ("force",)), bag.arrays(topics.TRUTH.name, ("deputies",))
+    thrust, truth = bag.arrays(topic, ("force",)), truth_of(bag) if truth is None else truth
     prefix = f"deputies.{deputies_of(bag).index(deputy)}."
     mass = np.interp(thrust["time"], truth["time"], truth[f"{prefix}mass"])
     return thrust["time"], np.cumsum(np.abs(thrust["force"]).sum(axis=1) / mass) * bag.tick_ns * 1e-9
@@ -84,13 +84,15 @@ def figures(bag: Bag) -> RunFigures:
         BagError: as for `trajectory`.
     """
     events = bag.arrays(topics.EVENTS.name, ("kind", "node")) if has_messages(bag, topics.EVENTS.name) else None
-    deputies = {name: _deputy_figures(bag, name, events) for name in deputies_of(bag)}
+    names = deputies_of(bag)
+    truth = truth_of(bag)
+    deputies = {name: _deputy_figures(bag, name, truth, events) for name in names}
     misses = 0 if events is None else event_kinds(events).count(kind_name(EventKind.MISS))
     return RunFigures(bag.topics[topics.TRUTH.name].count, misses, deputies)
 
 
-def _deputy_figures(bag: Bag, name: str, events: Fields | None) -> DeputyFigures:
-    path = trajectory(bag, name)
+def _deputy_figures(bag: Bag, name: str, truth: Fields, events: Fields | None) -> DeputyFigures:
+    path = trajectory(bag, name, truth)
     error = np.linalg.norm(path.error, axis=1)
     estimation = np.linalg.norm(path.estimation_error[:, :3], axis=1)
     measured = path.nis[path.nis > 0.0]
@@ -105,7 +107,7 @@ def _deputy_figures(bag: Bag, name: str, events: Fields | None) -> DeputyFigures
         path.period,
         float(changes[-1]) if len(changes) else 0.0,
     )
-    _, commanded = commanded_delta_v(bag, name)
+    _, commanded = commanded_delta_v(bag, name, truth)
     saturated, fallbacks = _limits_met(bag, name)
     return DeputyFigures(
         verdict=history.verdict,

@@ -102,13 +102,18 @@ def unseen_thrust(bag: Bag, deputy: str) -> UnseenThrust:
     return UnseenThrust(stamps[missing], acceleration[missing])
 
 
-def trajectory(bag: Bag, deputy: str) -> Trajectory:
-    """Trajectory of one deputy.
+def truth_of(bag: Bag) -> Fields:
+    """True states of the chief and all deputies; raises BagError without truth."""
+    return bag.arrays(topics.TRUTH.name, ("chief_state", "deputies"))
+
+
+def trajectory(bag: Bag, deputy: str, truth: Fields | None = None) -> Trajectory:
+    """Trajectory of one deputy; `truth` is `truth_of` the bag, where it has been read already.
 
     Raises:
         BagError: no truth, or no tick with an estimate and a target of this deputy.
     """
-    truth = bag.arrays(topics.TRUTH.name, ("chief_state", "deputies"))
+    truth = truth_of(bag) if truth is None else truth
     index = deputies_of(bag).index(deputy)
     missing = [topic.name for topic in (topics.ESTIMATE, topics.TARGET) if topic.of(deputy) not in bag.topics]
     if missing:

@@ -217,7 +217,7 @@ def _summarise(scenario: Scenario, bag: Path, speedup: float, options: argparse.
     from formation_gnc.analysis.verdict import Verdict
     from formation_gnc.recording.reader import Bag
 
-    recorded = Bag(bag)
+    recorded = Bag(bag).runs()[-1]
     result, flown = figures(recorded), RunHistory(recorded)
     separations = {
         "minimum separation": flown.nearest,

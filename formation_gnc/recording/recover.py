@@ -1,7 +1,7 @@
 """Recovery of bags that were cut or damaged."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
@@ -10,12 +10,14 @@ from mcap.records import Attachment, Channel, Message, MessageIndex, Metadata, S
 from mcap.summary import Summary
 
 from formation_gnc.errors import BagError
-from formation_gnc.recording.files import COMPRESSED, bag_files, missing_files
+from formation_gnc.recording.files import COMPRESSED, bag_files, missing_files, unpacker
 from formation_gnc.recording.mcap_file import verified_summary
 from formation_gnc.recording.salvage import Group, SalvageReader
 from formation_gnc.recording.sqlite_salvage import SqliteSalvage
 from formation_gnc.recording.topic_definition import TopicDefinition
 from formation_gnc.recording.writer import BagWriter
+
+type Unpack = Callable[[bytes], bytes]
 
 WHOLE, NOTHING_SAVED, PARTLY_LOST = 0, 1, 3
 
@@ -61,7 +63,9 @@ def recover(path: Path, output: Path) -> Recovery:
         return Recovery(WHOLE, None, saved, {}, ())
     reasons += tuple(_leave_out_other_types(surveys, lost))
     saved = sum(survey.saved.total() for survey in surveys)
-    _write(surveys, output, {"source": str(path), "lost": str(dict(lost)), "reasons": "\n".join(reasons)})
+    _write(
+        surveys, output, {"source": str(path), "lost": str(dict(lost)), "reasons": "\n".join(reasons)}, unpacker(path)
+    )
     return Recovery(PARTLY_LOST if reasons else WHOLE, output, saved, dict(lost), reasons)
 
 
@@ -160,8 +164,8 @@ def _leave_out_other_types(surveys: list[_Survey], lost: Counter[str]) -> Iterat
                 yield f"{survey.path}: topic {channel.topic} has messages of a second type, {kind[0] or 'unknown'}"
 
 
-def _write(surveys: list[_Survey], output: Path, report: dict[str, str]) -> None:
-    """Write everything readable into a new bag."""
+def _write(surveys: list[_Survey], output: Path, report: dict[str, str], unpack: Unpack | None) -> None:
+    """Write everything readable into a new bag, whose messages are plain."""
     metadata = {name: values for survey in surveys for name, values in survey.metadata.items()}
     metadata.pop("rosbag2", None)
     attachments = {name: data for survey in surveys for name, data in survey.attachments.items()}
@@ -173,13 +177,13 @@ def _write(surveys: list[_Survey], output: Path, report: dict[str, str]) -> None
                 if (schema is not None or not channel.schema_id) and channel.topic not in added:
                     added.add(channel.topic)
                     writer.add_defined_topic(channel.topic, TopicDefinition.recorded(schema, channel))
-            _copy_messages(survey, writer)
+            _copy_messages(survey, writer, unpack or bytes)
 
 
-def _copy_messages(survey: _Survey, writer: BagWriter) -> None:
+def _copy_messages(survey: _Survey, writer: BagWriter, unpack: Unpack) -> None:
     with survey.path.open("rb") as stream:
         for record in _reader(survey.path, stream).records():
             for item in record.records if isinstance(record, Group) else ():
                 if isinstance(item, Message) and item.channel_id in survey.saved:
                     topic = survey.channels[item.channel_id].topic
-                    writer.write(topic, item.data, item.log_time, item.sequence)
+                    writer.write(topic, unpack(item.data), item.log_time, item.sequence)

@@ -1,6 +1,7 @@
 """Bags that others wrote, merged, cut or reordered: read by their data and by header stamp, run by run."""
 
 import random
+import shutil
 import sqlite3
 import struct
 from collections.abc import Callable, Iterable, Sequence
@@ -300,3 +301,28 @@ def test_a_run_whose_beginning_is_not_in_the_bag_says_so(tmp_path, flight) -> No
         "begins at 20.5 s: the run before that is not in it"
         in Bag(write_mcap(tmp_path / "late.mcap", written(late))).remarks
     )
+
+
+@pytest.mark.parametrize("topic", ["/clock", "/truth", "/deputy1/thrust"])
+@pytest.mark.parametrize(
+    "damage",
+    [lambda data: b"", lambda data: data[:6], lambda data: data[:-9], lambda data: b"\0\7" + data[2:]],
+    ids=["no bytes", "no header", "cut", "another encoding"],
+)
+def test_a_message_that_does_not_fit_its_type_is_skipped_and_told(tmp_path, bag_path, flight, topic, damage) -> None:
+    place = next(i for i, message in enumerate(flight) if message.topic == topic and message.stamp_ns > 20 * 10**9)
+    messages = written(flight)
+    messages[place] = (*messages[place][:2], damage(messages[place][2]), messages[place][3])
+    bag = Bag(write_mcap(tmp_path / "other.mcap", messages))
+    assert f"skipped: 1 messages of {topic} that do not fit their type" in bag.remarks
+    kept = [message.stamp_ns for message in flight if message.topic == topic and message is not flight[place]]
+    assert bag.arrays(topic)["stamp_ns"].tolist() == kept
+
+
+def test_plain_messages_are_read_where_the_metadata_says_that_each_is_compressed(tmp_path, bag_path) -> None:
+    bag = tmp_path / "bag"
+    shutil.copytree(bag_path, bag)
+    text = (bag / "metadata.yaml").read_text().replace("compression_mode: ''", "compression_mode: MESSAGE")
+    (bag / "metadata.yaml").write_text(text)
+    assert "MESSAGE" in text
+    assert same(Bag(bag), Bag(bag_path))
