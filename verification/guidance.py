@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from bench import fleet as bench
 from formation_gnc.analysis.compare import gnc_topics
+from formation_gnc.analysis.figures import figures as figures_of
 from formation_gnc.analysis.run_history import RunHistory
 from formation_gnc.analysis.separation import predicted_approach
-from formation_gnc.analysis.trajectory import figures as figures_of
-from formation_gnc.analysis.trajectory import trajectory
+from formation_gnc.analysis.trajectory import trajectories
 from formation_gnc.cli import main as command
 from formation_gnc.common import CommonParameters, Orbit
 from formation_gnc.guidance.assignment import assign, assign_with_phase, transfer_costs
@@ -238,7 +238,7 @@ def of_fleet(graph: Bag, process: Bag) -> tuple[str, list[Figure]]:
     ]
     latest = 0.0
     for name, deputy in flown.deputies.items():
-        path = trajectory(graph, name)
+        path = trajectories(graph)[name]
         off = np.linalg.norm(path.error, axis=1)
         last = float(off[path.time > path.time[-1] - orbit].max())
         latest = max(latest, last)

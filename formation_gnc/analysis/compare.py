@@ -9,11 +9,11 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from formation_gnc.analysis.figures import commanded_delta_v, figures
+from formation_gnc.analysis.figures import figures
 from formation_gnc.analysis.matplotlib_renderer import draw
 from formation_gnc.analysis.plot import COLOURS, TIME, Axis, Curve, Plot, Style
 from formation_gnc.analysis.thinning import POINTS
-from formation_gnc.analysis.trajectory import deputies_of, trajectory
+from formation_gnc.analysis.trajectory import Trajectory, trajectories
 from formation_gnc.flight import topics
 from formation_gnc.recording.reader import Bag
 from formation_gnc.types import Vector
@@ -56,16 +56,17 @@ def run_figures(bag: Bag) -> dict[str, dict[str, float | str]]:
 
 def draw_comparison(bags: Sequence[Bag], labels: Sequence[str], path: Path) -> None:
     """Draw errors, applied and commanded delta-v over time: a row per deputy, a curve per bag."""
-    names = list(dict.fromkeys(name for bag in bags for name in deputies_of(bag)))
+    runs = [trajectories(bag) for bag in bags]
+    names = list(dict.fromkeys(name for run in runs for name in run))
     figure = Figure(figsize=(13.0, 8.0 * len(names) + 0.4), layout="constrained", dpi=100)
     FigureCanvasAgg(figure)
     grid = figure.add_gridspec(len(AXES) // 2 * len(names), 2)
     for row, name in enumerate(names):
         curves: list[list[Curve]] = [[] for _ in AXES]
         looks = (Style(colour, line) for colour, line in zip(cycle(COLOURS), cycle(LINES)))
-        for bag, label, look in zip(bags, labels, looks, strict=False):
-            if name in deputies_of(bag):
-                for of_axis, (time, values) in zip(curves, _series(bag, name), strict=True):
+        for run, label, look in zip(runs, labels, looks, strict=False):
+            if name in run:
+                for of_axis, (time, values) in zip(curves, _series(run[name]), strict=True):
                     step = max(1, len(time) // POINTS)
                     of_axis.append(Curve(label, time[::step] / 3600.0, values[::step], look))
         for column, (axis, of_axis) in enumerate(zip(AXES, curves, strict=True)):
@@ -74,11 +75,9 @@ def draw_comparison(bags: Sequence[Bag], labels: Sequence[str], path: Path) -> N
     figure.savefig(path)
 
 
-def _series(bag: Bag, deputy: str) -> Iterator[tuple[Vector, Vector]]:
+def _series(path: Trajectory) -> Iterator[tuple[Vector, Vector]]:
     """Time (s) and values of each of AXES."""
-    path = trajectory(bag, deputy)
     yield path.time, np.linalg.norm(path.error, axis=1)
     yield path.time, np.linalg.norm(path.estimation_error[:, :3], axis=1)
     yield path.applied_time, 1e3 * np.cumsum(np.abs(path.applied).sum(axis=1)) * path.tick
-    time, delta_v = commanded_delta_v(bag, deputy)
-    yield time, 1e3 * delta_v
+    yield path.commanded_time, 1e3 * path.commanded_delta_v

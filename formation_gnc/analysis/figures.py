@@ -3,9 +3,9 @@
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
-from formation_gnc.analysis.trajectory import deputies_of, event_kinds, has_messages, trajectory
+from formation_gnc.analysis.trajectory import Trajectory, event_kinds, has_messages, trajectories
 from formation_gnc.analysis.verdict import ErrorHistory, Verdict
 from formation_gnc.flight import topics
 from formation_gnc.recording.fields import Fields
@@ -38,6 +38,8 @@ class DeputyFigures:
     """Share of the ticks on which the thrust limit cut the demand."""
     fallbacks: int
     """Ticks on which the law's own answer could not be used."""
+    law: str
+    """Name of the control law of the last command; empty without one."""
 
     def by_name(self) -> dict[str, float | str]:
         """Figures by name, each axis and each bound in words of its own."""
@@ -62,35 +64,19 @@ class RunFigures:
         return max((each.verdict for each in self.deputies.values()), key=list(Verdict).index)
 
 
-def commanded_delta_v(bag: Bag, deputy: str) -> tuple[Vector, Vector]:
-    """Delta-v that the controller commanded, whether or not it was applied.
-
-    Returns:
-        (N,) time, s, and (N,) delta-v up to the end of that tick, all axes added, m/s.
-    """
-    topic = topics.THRUST.of(deputy)
-    if not has_messages(bag, topic):
-        return np.zeros(0), np.zeros(0)
-    thrust, truth = bag.arrays(topic, ("force",)), bag.arrays(topics.TRUTH.name, ("deputies",))
-    prefix = f"deputies.{deputies_of(bag).index(deputy)}."
-    mass = np.interp(thrust["time"], truth["time"], truth[f"{prefix}mass"])
-    return thrust["time"], np.cumsum(np.abs(thrust["force"]).sum(axis=1) / mass) * bag.tick_ns * 1e-9
-
-
 def figures(bag: Bag) -> RunFigures:
     """Figures of a run.
 
     Raises:
-        BagError: as for `trajectory`.
+        BagError: as for `trajectories`.
     """
     events = bag.arrays(topics.EVENTS.name, ("kind", "node")) if has_messages(bag, topics.EVENTS.name) else None
-    deputies = {name: _deputy_figures(bag, name, events) for name in deputies_of(bag)}
+    deputies = {name: _deputy_figures(name, path, events) for name, path in trajectories(bag).items()}
     misses = 0 if events is None else event_kinds(events).count(kind_name(EventKind.MISS))
     return RunFigures(bag.topics[topics.TRUTH.name].count, misses, deputies)
 
 
-def _deputy_figures(bag: Bag, name: str, events: Fields | None) -> DeputyFigures:
-    path = trajectory(bag, name)
+def _deputy_figures(name: str, path: Trajectory, events: Fields | None) -> DeputyFigures:
     error = np.linalg.norm(path.error, axis=1)
     estimation = np.linalg.norm(path.estimation_error[:, :3], axis=1)
     measured = path.nis[path.nis > 0.0]
@@ -105,8 +91,7 @@ def _deputy_figures(bag: Bag, name: str, events: Fields | None) -> DeputyFigures
         path.period,
         float(changes[-1]) if len(changes) else 0.0,
     )
-    _, commanded = commanded_delta_v(bag, name)
-    saturated, fallbacks = _limits_met(bag, name)
+    commanded = path.commanded_delta_v
     return DeputyFigures(
         verdict=history.verdict,
         final_error_m=float(error[-1]),
@@ -115,13 +100,14 @@ def _deputy_figures(bag: Bag, name: str, events: Fields | None) -> DeputyFigures
         estimate_rms_m=float(np.sqrt(np.mean(estimation**2))),
         mean_nis=float(measured.mean()) if len(measured) else 0.0,
         nis_ratio=float(path.nis.sum()) / count if count else 0.0,
-        nis_band=(chi2.ppf([0.00135, 0.99865], count) / count).tolist() if count else [0.0, 0.0],
+        nis_band=(2.0 * gammaincinv(count / 2.0, [0.00135, 0.99865]) / count).tolist() if count else [0.0, 0.0],
         divergences=len(_times_of(events, name, EventKind.DIVERGED, EventKind.LOST)),
         delta_v_m_s=float(path.delta_v.sum()),
         delta_v_axes_m_s=path.delta_v.tolist(),
         commanded_delta_v_m_s=float(commanded[-1]) if len(commanded) else 0.0,
-        saturated=saturated,
-        fallbacks=fallbacks,
+        saturated=path.saturated,
+        fallbacks=path.fallbacks,
+        law=path.law,
     )
 
 
@@ -131,18 +117,3 @@ def _times_of(events: Fields | None, deputy: str, *kinds: EventKind) -> Vector:
         return np.zeros(0)
     own = np.array([str(node).startswith(f"/{deputy}/") for node in events["node"]])
     return np.asarray(events["time"][own & np.isin(event_kinds(events), [kind_name(kind) for kind in kinds])])
-
-
-def _limits_met(bag: Bag, deputy: str) -> tuple[float, int]:
-    """Share of the ticks with a demand beyond the thrust limit, and number of ticks on a fallback."""
-    topic = topics.STATUS.of(deputy)
-    if not has_messages(bag, topic):
-        return 0.0, 0
-    status = bag.arrays(topic, ("saturated", "fallback"))
-    return float(status["saturated"].any(axis=1).mean()), int(np.count_nonzero(status["fallback"] != ""))
-
-
-def law_at_the_end(bag: Bag, deputy: str) -> str:
-    """Name of the control law of the last command; empty without one."""
-    topic = topics.STATUS.of(deputy)
-    return str(bag.arrays(topic, ("algorithm",))["algorithm"][-1]) if has_messages(bag, topic) else ""

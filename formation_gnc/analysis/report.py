@@ -8,7 +8,7 @@ from typing import Any
 import plotly.graph_objects as go
 
 from formation_gnc.analysis.figure_table import FIGURES
-from formation_gnc.analysis.figures import figures, law_at_the_end
+from formation_gnc.analysis.figures import figures
 from formation_gnc.analysis.panels.panel import Panel
 from formation_gnc.analysis.panels.registry import DEPUTY_PANELS, FLEET_PANELS
 from formation_gnc.analysis.plot import Plot
@@ -94,7 +94,7 @@ def _figure_table(bag: Bag) -> str:
     deputies = figures(bag).deputies
     values = {name: each.by_name() for name, each in deputies.items()}
     head = "".join(f"<th>{escape(name)}</th>" for name in deputies)
-    rows = [("control law at the end", [law_at_the_end(bag, name) for name in deputies])]
+    rows = [("control law at the end", [each.law for each in deputies.values()])]
     rows += [(figure.label, [figure.text(values[name][figure.name]) for name in deputies]) for figure in FIGURES]
     body = "".join(
         f"<tr><th>{escape(label)}</th>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"

@@ -1,9 +1,12 @@
 """Trajectories of a recorded run."""
 
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from math import sqrt, tau
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from formation_gnc.errors import BagError
 from formation_gnc.flight import topics
@@ -40,6 +43,16 @@ class Trajectory:
     """Length of a tick, s."""
     period: float
     """Period of the chief's orbit at the start, s."""
+    commanded_time: Vector
+    """(K,) time of each command, s."""
+    commanded_delta_v: Vector
+    """(K,) delta-v commanded up to the end of that tick, whether or not it was applied, all axes added, m/s."""
+    saturated: float
+    """Share of the ticks with a demand beyond the thrust limit."""
+    fallbacks: int
+    """Ticks on which the law's own answer could not be used."""
+    law: str
+    """Name of the control law of the last command; empty without one."""
 
     @property
     def error(self) -> Matrix:
@@ -102,43 +115,119 @@ def unseen_thrust(bag: Bag, deputy: str) -> UnseenThrust:
     return UnseenThrust(stamps[missing], acceleration[missing])
 
 
-def trajectory(bag: Bag, deputy: str) -> Trajectory:
-    """Trajectory of one deputy.
+Columns = tuple[NDArray[Any], ...]
+Selection = tuple[Collection[str], Callable[[Fields], Columns]]
+"""Fields of a topic, and what is kept of a batch of them."""
+
+
+def trajectories(bag: Bag) -> dict[str, Trajectory]:
+    """Trajectory of each deputy by name, in one pass.
 
     Raises:
-        BagError: no truth, or no tick with an estimate and a target of this deputy.
+        BagError: no truth, or no tick with an estimate and a target of a deputy.
     """
-    truth = bag.arrays(topics.TRUTH.name, ("chief_state", "deputies"))
-    index = deputies_of(bag).index(deputy)
-    missing = [topic.name for topic in (topics.ESTIMATE, topics.TARGET) if topic.of(deputy) not in bag.topics]
-    if missing:
-        raise BagError(f"{bag.path}: has no {' and no '.join(missing)} of {deputy}")
-    estimate = bag.arrays(topics.ESTIMATE.of(deputy), ("relative_state", "covariance", "nis", "innovations"))
-    target = bag.arrays(topics.TARGET.of(deputy), ("relative_state",))
-    stamps = np.intersect1d(np.intersect1d(truth["stamp_ns"], estimate["stamp_ns"]), target["stamp_ns"])
+    names = deputies_of(bag)
+    selections: dict[str, Selection] = {topics.TRUTH.name: (("chief_state", "deputies"), _true_columns(len(names)))}
+    for name in names:
+        missing = [topic.name for topic in (topics.ESTIMATE, topics.TARGET) if topic.of(name) not in bag.topics]
+        if missing:
+            raise BagError(f"{bag.path}: has no {' and no '.join(missing)} of {name}")
+        own = {topic.of(name): selection for topic, selection in _OF_DEPUTY.items()}
+        selections |= {topic: selection for topic, selection in own.items() if has_messages(bag, topic)}
+    columns = _columns(bag, selections)
+    stamps, chief, *states = columns[topics.TRUTH.name]
+    period = _period(chief[0])
+    return {
+        name: _trajectory(bag, name, columns, (stamps, *states[3 * index : 3 * index + 3]), period)
+        for index, name in enumerate(names)
+    }
+
+
+def _columns(bag: Bag, selections: Mapping[str, Selection]) -> dict[str, Columns]:
+    """What is selected of each topic, read in one pass; memory is that of what is kept."""
+    parts: dict[str, list[Columns]] = {topic: [] for topic in selections}
+    for topic, batch in bag.batches(list(selections), fields={topic: each[0] for topic, each in selections.items()}):
+        parts[topic].append(selections[topic][1](batch))
+    return {
+        topic: tuple(np.concatenate(column) for column in zip(*rows, strict=True))
+        for topic, rows in parts.items()
+        if rows
+    }
+
+
+def _true_columns(deputies: int) -> Callable[[Fields], Columns]:
+    """Stamps and chief's states, then relative state, force applied over the tick before and mass of each deputy."""
+
+    def select(truth: Fields) -> Columns:
+        own: Iterator[str] = (f"deputies.{index}.{field}" for index in range(deputies) for field in _OWN_TRUTH)
+        return truth["stamp_ns"], truth["chief_state"][:1], *(truth[name] for name in own)
+
+    return select
+
+
+_OWN_TRUTH = ("relative_state", "applied_force", "mass")
+
+
+def _estimated_columns(estimates: Fields) -> Columns:
+    variance = np.diagonal(estimates["covariance"].reshape(-1, 6, 6), axis1=1, axis2=2)
+    used = _used_innovations(estimates)
+    return estimates["stamp_ns"], estimates["relative_state"], np.sqrt(variance), estimates["nis"], used
+
+
+_OF_DEPUTY: dict[Any, Selection] = {
+    topics.ESTIMATE: (("relative_state", "covariance", "nis", "innovations"), _estimated_columns),
+    topics.TARGET: (("relative_state",), lambda target: (target["stamp_ns"], target["relative_state"])),
+    topics.THRUST: (("force",), lambda thrust: (thrust["time"], np.abs(thrust["force"]).sum(axis=1))),
+    topics.STATUS: (
+        ("saturated", "fallback", "algorithm"),
+        lambda status: (
+            np.asarray(status["saturated"].any(axis=1)),
+            np.asarray(status["fallback"] != ""),
+            status["algorithm"][-1:],
+        ),
+    ),
+}
+"""What is read of each of a deputy's topics."""
+
+_NO_COLUMNS: Columns = (np.zeros(0),) * 5
+
+
+def _trajectory(bag: Bag, deputy: str, columns: Mapping[str, Columns], truth: Columns, period: float) -> Trajectory:
+    """Trajectory of one deputy, of the stamps, relative states, forces and masses of its truth."""
+    true_stamps, states, forces, masses = truth
+    estimate_stamps, estimates, sigma, nis, innovations = columns.get(topics.ESTIMATE.of(deputy), _NO_COLUMNS)
+    target_stamps, targets, *_ = columns.get(topics.TARGET.of(deputy), _NO_COLUMNS)
+    stamps = np.intersect1d(np.intersect1d(true_stamps, estimate_stamps), target_stamps)
     if not len(stamps):
         raise BagError(f"{bag.path}: no tick with an estimate and a target of {deputy}")
-    rows = {id(part): np.searchsorted(part["stamp_ns"], stamps) for part in (truth, estimate, target)}
-    prefix = f"deputies.{index}."
+    true_rows, rows, target_rows = (
+        np.searchsorted(each, stamps) for each in (true_stamps, estimate_stamps, target_stamps)
+    )
     tick = bag.tick_ns * 1e-9
     unseen = unseen_thrust(bag, deputy)
-    ends = np.concatenate((truth["stamp_ns"][1:], unseen.stamps))
-    # Truth holds the force of the tick before.
-    applied = (truth[f"{prefix}applied_force"] / truth[f"{prefix}mass"][:, None])[1:]
+    ends = np.concatenate((true_stamps[1:], unseen.stamps))
     order = np.argsort(ends, kind="stable")
-    covariance = estimate["covariance"][rows[id(estimate)]].reshape(-1, 6, 6)
+    applied = (forces / masses[:, None])[1:]  # truth holds the force of the tick before
+    commanded_time, commanded, *_ = columns.get(topics.THRUST.of(deputy), _NO_COLUMNS)
+    commanded = commanded / np.interp(commanded_time, true_stamps * 1e-9, masses)
+    saturated, fallbacks, laws, *_ = columns.get(topics.STATUS.of(deputy), _NO_COLUMNS)
     return Trajectory(
         time=stamps * 1e-9,
-        truth=truth[f"{prefix}relative_state"][rows[id(truth)]],
-        estimate=estimate["relative_state"][rows[id(estimate)]],
-        sigma=np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)),
-        target=target["relative_state"][rows[id(target)]],
-        nis=estimate["nis"][rows[id(estimate)]],
-        innovations=_used_innovations(estimate)[rows[id(estimate)]],
+        truth=states[true_rows],
+        estimate=estimates[rows],
+        sigma=sigma[rows],
+        target=targets[target_rows],
+        nis=nis[rows],
+        innovations=innovations[rows],
         applied=np.concatenate((applied, unseen.acceleration))[order],
         applied_time=ends[order] * 1e-9 - tick,
         tick=tick,
-        period=_period(truth["chief_state"][0]),
+        period=period,
+        commanded_time=commanded_time,
+        commanded_delta_v=np.cumsum(commanded) * tick,
+        saturated=float(saturated.mean()) if len(saturated) else 0.0,
+        fallbacks=int(np.count_nonzero(fallbacks)),
+        law=str(laws[-1]) if len(laws) else "",
     )
 
 

@@ -73,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _navigate(bag: "Bag", options: argparse.Namespace) -> dict[str, Comparison]:
     """Replay the navigation of a run; returns a comparison for each deputy that is asked for."""
-    from formation_gnc.analysis.trajectory import deputies_of
+    from formation_gnc.analysis.trajectory import deputies_of, has_messages
     from formation_gnc.recording.reader import Bag
     from formation_gnc.transport.replay_recorder import replay_into
 
@@ -83,8 +83,11 @@ def _navigate(bag: "Bag", options: argparse.Namespace) -> dict[str, Comparison]:
     with tempfile.TemporaryDirectory(prefix="formation_gnc-") as directory:
         replayed = Path(directory) / "replay"
         replay_into(bag, replayed, ["navigation"], options.params)
-        deputies = [options.deputy] if options.deputy else known
-        return {deputy: _compare(bag, Bag(replayed), deputy) for deputy in deputies}
+        deputies, now = [options.deputy] if options.deputy else known, Bag(replayed)
+        for deputy in deputies:
+            if not has_messages(now, topics.ESTIMATE.of(deputy)):
+                raise ConfigurationError(f"{bag.path}: no estimate of {deputy}: no measurement has an acquisition fix")
+        return {deputy: _compare(bag, now, deputy) for deputy in deputies}
 
 
 def _compare(recorded: "Bag", replayed: "Bag", deputy: str) -> Comparison:

@@ -15,7 +15,7 @@ from formation_gnc.recording.recover import NOTHING_SAVED, recover
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
-    parser.add_argument("bag", type=Path, help="bag directory or .mcap file")
+    parser.add_argument("bag", type=Path, help="bag directory, .mcap or .db3 file")
     parser.add_argument(
         "--output",
         metavar="DIR",

@@ -81,7 +81,8 @@ def run(options: argparse.Namespace) -> int:
     if bag.exists():
         raise ConfigurationError(f"bag {bag}: exists already; name a directory that does not")
     console = Console(stderr=True, highlight=False)
-    for warning in (*scenario.departures(), *process_noise_warnings(scenario)):
+    ignored = [f"parameter {name}, given to all nodes: ignored, since none has it" for name in scenario.ignored]
+    for warning in (*ignored, *scenario.departures(), *process_noise_warnings(scenario)):
         console.print(f"warning: {warning}", soft_wrap=True)
     on_graph = partial(_fly_on_graph, composed=options.composed, display=options.display)
     try:
@@ -216,7 +217,7 @@ def _summarise(scenario: Scenario, bag: Path, speedup: float, options: argparse.
     from formation_gnc.analysis.verdict import Verdict
     from formation_gnc.recording.reader import Bag
 
-    recorded = Bag(bag)
+    recorded = Bag(bag).runs()[-1]
     result, flown = figures(recorded), RunHistory(recorded)
     separations = {
         "minimum separation": flown.nearest,

@@ -119,12 +119,12 @@ class TickBarrier:
         return not self.has_recorder or (self.recorded is not None and self.recorded >= end)
 
     def reason_of_miss(self, deputy: str, absent: Collection[str]) -> str:
-        """Why a deputy got no thrust, for people; `absent` nodes of it are not there, as far as DDS knows."""
+        """Why a deputy got no thrust, for people; nobody publishes its `absent` topics, as far as DDS knows."""
         if deputy in self.answers:
             return f"commanded {self.answers[deputy].tolist()} N"
         if self.deadline == inf:
             return "no answer"
-        where = f" ({', '.join(absent)} not there)" if absent else ""
+        where = f" (nobody publishes {', '.join(absent)})" if absent else ""
         return f"did not answer within {self.deadline:g} s{where}"
 
     def _is_overdue(self, now: float) -> bool:

@@ -135,6 +135,13 @@ def deputy_of(name: str) -> str:
     return name.rpartition("/")[0].strip("/")
 
 
+def of_one_publisher(deputy: str) -> list[str]:
+    """Full names of the topics with one message at every tick from one node: those of a deputy, or of the run."""
+    if not deputy:
+        return [CLOCK.name, TRUTH.name]
+    return [topic.of(deputy) for topic in DEPUTY_TOPICS if topic.every_tick and topic is not TIMING]
+
+
 def deputies_in(names: "list[str] | dict[str, Any]") -> list[str]:
     """Deputies that have a measurement among full topic names, sorted."""
     return sorted(deputy_of(name) for name in names if name == MEASUREMENT.of(deputy_of(name)))

@@ -20,8 +20,7 @@ from formation_gnc.transport.markers import DisplayParameters, markers, transfor
 from formation_gnc.transport.node import ConfiguredNode
 from formation_gnc.transport.process import run
 from formation_gnc.transport.qos import quality
-from formation_gnc.transport.raw_topics import first_stamp
-from formation_gnc.transport.subscriptions import Information
+from formation_gnc.transport.subscriptions import Information, first_stamp
 from formation_gnc.types import NANOSECONDS, Vector
 
 
@@ -41,7 +40,7 @@ class DisplayNode(ConfiguredNode):
         self._targets: dict[str, bytes] = {}
         self._trails: dict[str, deque[Vector]] = {}
         self._trail_time = -1
-        self.subscribe(Truth, topics.TRUTH.name, self._on_truth)
+        self.subscribe_to_source(Truth, topics.TRUTH.name, self._on_truth)
         self._diagnostics = DiagnosticsPublisher(self, self.full_name("") or "/")
         self.create_wall_timer(PERIOD, self._diagnose)
         self.create_wall_timer(1.0 / self.values.rate, self._draw)
@@ -85,7 +84,7 @@ class DisplayNode(ConfiguredNode):
         for deputy in truth.deputies:
             if deputy.name not in self._targets:
                 self._targets[deputy.name] = b""
-                self.subscribe(Target, topics.TARGET.of(deputy.name), partial(self._on_target, deputy.name))
+                self.subscribe_to_source(Target, topics.TARGET.of(deputy.name), partial(self._on_target, deputy.name))
         targets = {name: from_cdr(Target, data) for name, data in self._targets.items() if data}
         size = self.values.size or max(
             1.0, max(float(np.linalg.norm(each.relative_state[:3])) for each in truth.deputies) / 40.0

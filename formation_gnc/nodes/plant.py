@@ -12,9 +12,11 @@ from formation_gnc.plant.parameters import PlantParameters
 from formation_gnc.records import Clock, Event, Measurement, Thrust, Truth
 from formation_gnc.sil.plant_executive import PlantExecutive
 from formation_gnc.sil.report import Report
+from formation_gnc.transport.conversion import from_cdr
 from formation_gnc.transport.diagnostics import RUN, DiagnosticsPublisher
 from formation_gnc.transport.node import ConfiguredNode
 from formation_gnc.transport.process import run, stop_requested
+from formation_gnc.transport.subscriptions import Information
 
 
 class PlantNode(ConfiguredNode):
@@ -32,11 +34,11 @@ class PlantNode(ConfiguredNode):
         self._recorded_topics = set(map(self.full_name, recorded))
         self.executive = PlantExecutive(self.values, self)
         for name in deputies:
-            self.subscribe_decoded(Thrust, COMMAND.of(name), partial(self._on_thrust, name))
+            self.subscribe_to_source(Thrust, COMMAND.of(name), partial(self._on_thrust, name))
         self.subscribe_decoded(Clock, topics.PROGRESS.name, self._on_progress)
 
-    def _on_thrust(self, deputy: str, thrust: Thrust) -> None:
-        self.executive.answer(deputy, thrust, monotonic())
+    def _on_thrust(self, deputy: str, data: bytes, _: Information) -> None:
+        self.executive.answer(deputy, from_cdr(Thrust, data), monotonic())
 
     def _on_progress(self, progress: Clock) -> None:
         self.executive.recorded(progress.time, monotonic())
@@ -47,18 +49,9 @@ class PlantNode(ConfiguredNode):
         if topic == topics.EVENTS.name:
             self.log_event(record)
 
-    def is_published(self, topic: str) -> bool:
-        """Whether anybody publishes a topic."""
-        return bool(self.count_publishers(self.full_name(topic)))
-
-    def publishers_of(self, topic: str) -> list[str]:
-        """Full names of the nodes that publish a topic."""
-        offers = self.get_publishers_info_by_topic(self.full_name(topic))
-        return [f"{each.node_namespace.rstrip('/')}/{each.node_name}" for each in offers]
-
     def has_recorder(self) -> bool:
         """Whether a recorder reports progress."""
-        return self.is_published(topics.PROGRESS.name)
+        return bool(self.count_publishers(self.full_name(topics.PROGRESS.name)))
 
     def recorder_listens(self) -> bool:
         """Whether the recorder, whatever its name, has subscribed to every topic of the run."""

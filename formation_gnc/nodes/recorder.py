@@ -66,7 +66,7 @@ class RecorderNode(ConfiguredNode):
         self.create_wall_timer(FLUSH_INTERVAL, self.session.while_disk_lasts(self.session.bag.flush))
 
     def _open(self, topic: str, type_name: str, latched: bool) -> Callback:
-        return self.session.open_topic(topic, type_name, partial(self.count_publishers, self.full_name(topic)), latched)
+        return self.session.open_topic(topic, type_name, partial(self.publishers_of, topic), latched)
 
     def _nodes_of_run(self, now: float) -> dict[str, str]:
         """Full names of the nodes with parameters, by their names within the formation.
@@ -81,8 +81,7 @@ class RecorderNode(ConfiguredNode):
         for role, topic in roles.items():
             if role in nodes:
                 continue
-            for offer in self.get_publishers_info_by_topic(self.full_name(topic)):
-                full_name = f"{offer.node_namespace.rstrip('/')}/{offer.node_name}"
+            for full_name in self.publishers_of(topic):
                 if full_name in known:
                     nodes[role] = full_name
                 else:
@@ -103,8 +102,8 @@ class RecorderNode(ConfiguredNode):
                 session.parameters.asked(node, now)
         if session.parameters.is_complete(now):
             session.report_progress()
-        if lost := session.new_losses():
-            self.get_logger().warning(f"lost so far: {', '.join(f'{n} of {topic}' for topic, n in lost.items())}")
+        for text in session.new_troubles():
+            self.get_logger().warning(text)
 
     def _diagnose(self) -> None:
         failure, lost, stamp = self.session.failure, self.session.lost, self.session.progress.stamp

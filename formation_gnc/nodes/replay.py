@@ -16,8 +16,7 @@ from formation_gnc.transport.diagnostics import PERIOD, DiagnosticsPublisher
 from formation_gnc.transport.node import ConfiguredNode
 from formation_gnc.transport.process import run, stop_requested
 from formation_gnc.transport.qos import quality
-from formation_gnc.transport.raw_topics import first_stamp
-from formation_gnc.transport.subscriptions import Information
+from formation_gnc.transport.subscriptions import Information, first_stamp
 from formation_gnc.types import NANOSECONDS
 
 BURST = 50

@@ -40,9 +40,10 @@ def tick_of(metadata: Mapping[str, Mapping[str, str]], stamps: Stamps) -> int:
 
 
 def gaps(names: Mapping[str, int], stamps_of: Callable[[str], Stamps], tick: int) -> list[str]:
-    """A line for each topic that lacks ticks between the first and the last of the run.
+    """A line for a run that begins late, and for each topic that lacks ticks between its first and its last.
 
-    What answers the plant may begin late, once its filter has a fix, and its last tick may be under way.
+    Every run begins at 0. What answers the plant may begin late, once its filter has a fix, and its last tick may be
+    under way.
 
     Args:
         names: number of messages by topic.
@@ -57,7 +58,7 @@ def gaps(names: Mapping[str, int], stamps_of: Callable[[str], Stamps], tick: int
     if not ends or tick <= 0:
         return []
     start, end = min(int(first) for first, _ in ends), max(int(last) for _, last in ends)
-    lines = []
+    lines = [f"begins at {start / NANOSECONDS:g} s: the run before that is not in it"] if start >= tick else []
     for name, stamps in present.items():
         own = name in by_plant
         places = _places(stamps, start if own else int(stamps[0]), end if own else end - tick, tick)

@@ -1,6 +1,7 @@
 """All messages of a bag's files by topic: which are read, in which order they stand, and what is left out."""
 
 from array import array
+from collections import Counter
 from collections.abc import Collection, Iterator
 from functools import cached_property
 from pathlib import Path
@@ -67,6 +68,8 @@ class BagContents:
         self._counts: dict[str, int] = {}
         for topic, candidates in self._candidates().items():
             self._choose(topic, candidates)
+        for topic, misfits in self._misfits().items():
+            self.remarks.append(f"skipped: {misfits} messages of {topic} that do not fit their type")
         if orphans := sum(file.orphans for file in files):
             self.remarks.append(f"skipped: {orphans} messages of topics that no file defines")
 
@@ -78,6 +81,14 @@ class BagContents:
                 counts = found.setdefault(series.topic, {})
                 counts[series] = counts.get(series, 0) + len(file.stamps(series))
         return found
+
+    def _misfits(self) -> Counter[str]:
+        """Number of messages that cannot be decoded, by topic."""
+        found: Counter[str] = Counter()
+        for file in self._files:
+            for series in file.definitions:
+                found[series.topic] += file.misfits(series)
+        return +found
 
     def _choose(self, topic: str, candidates: dict[Series, int]) -> None:
         """Read the series of the run's type, or else the fullest, with those laid out alike."""

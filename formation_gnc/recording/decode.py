@@ -105,6 +105,14 @@ class MessageType:
                     columns.setdefault(field, []).append((rows, _native(records[field])))
         return {field: _merge(parts, len(messages)) for field, parts in columns.items()}
 
+    def fits(self, data: bytes) -> bool:
+        """Whether a message can be decoded."""
+        try:
+            self._layout(data)
+        except BagError:
+            return False
+        return True
+
     def _layout(self, data: bytes) -> CdrLayout:
         """Layout of a message: a known one with the same element counts, or a new one."""
         known = self._layouts.setdefault((data[:2], len(data)), [])

@@ -48,9 +48,12 @@ def open_files(path: Path) -> list[StoredFile]:
     Raises:
         BagError: there is no such bag, or one of its files cannot be read.
     """
-    information = _metadata(path)
-    unpack = _decompressed if str(information.get("compression_mode", "")).upper() == "MESSAGE" else None
-    return [_open(file, unpack) for file in bag_files(path)]
+    return [_open(file, unpacker(path)) for file in bag_files(path)]
+
+
+def unpacker(path: Path) -> Callable[[bytes], bytes] | None:
+    """What decompresses each message of a bag, by its metadata.yaml; None where they are not compressed."""
+    return _decompressed if str(_metadata(path).get("compression_mode", "")).upper() == "MESSAGE" else None
 
 
 def _open(path: Path, unpack: Callable[[bytes], bytes] | None) -> StoredFile:
@@ -87,7 +90,13 @@ def _unpacked(path: Path, unpack: Callable[[bytes], bytes] | None) -> StoredFile
 
 
 def _decompressed(data: bytes) -> bytes:
-    return zstandard.ZstdDecompressor().decompressobj().decompress(data)
+    """A message of a bag that compresses each; as it is where it is plain after all, empty where it is damaged."""
+    if not data.startswith(_ZSTD):
+        return data
+    try:
+        return zstandard.ZstdDecompressor().decompressobj().decompress(data)
+    except zstandard.ZstdError:
+        return b""
 
 
 def _metadata(path: Path) -> dict[str, Any]:

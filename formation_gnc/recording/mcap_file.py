@@ -255,22 +255,6 @@ def chunk_records(content: bytes, channels: Collection[int] | None = None) -> It
             yield Channel.read(ReadDataStream(BytesIO(content[body:offset])))
 
 
-def mcap_files(path: Path) -> list[Path]:
-    """Files of a bag (a directory or a single file) in order of the number at the end of their names.
-
-    Raises:
-        BagError: there is no such bag, or its directory holds no .mcap file.
-    """
-    if path.is_dir():
-        files = sorted(path.glob("*.mcap"), key=lambda file: (file_number(file.stem), file.name))
-        if not files:
-            raise BagError(f"{path}: holds no .mcap file")
-        return files
-    if not path.exists():
-        raise BagError(f"{path}: no such bag")
-    return [path]
-
-
 def file_number(stem: str) -> int:
     """Number at the end of a file's name; -1 for none."""
     digits = stem.rpartition("_")[2]

@@ -10,6 +10,9 @@ import formation_gnc
 LOST = "lost messages"
 """Name of the metadata record with the number of lost messages by topic."""
 
+IGNORED = "messages of other publishers"
+"""Name of the metadata record with the number of messages by topic that the recorder left out."""
+
 PACKAGES = ("numpy", "scipy", "numba", "filterpy", "osqp", "mcap")
 """Packages on which the numbers of a run depend."""
 

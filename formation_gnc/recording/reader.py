@@ -20,7 +20,7 @@ from formation_gnc.recording.contents import BagContents, BagMessage, own_type, 
 from formation_gnc.recording.decode import MessageType, installed_type
 from formation_gnc.recording.fields import Arrays, Fields
 from formation_gnc.recording.order import RunOrder, pacing_topic
-from formation_gnc.recording.provenance import LOST
+from formation_gnc.recording.provenance import IGNORED, LOST
 from formation_gnc.recording.stored_file import OWN_PACKAGE, type_of
 
 if TYPE_CHECKING:
@@ -100,6 +100,10 @@ class Bag:
             lines.append(f"{len(self._orders)} runs are in it, one after the other")
         if self._error is not None:
             lines.append(str(self._error))
+        ignored = self.metadata.get(IGNORED, {})
+        if ignored:
+            named = ", ".join(f"{count} of {topic}" for topic, count in ignored.items())
+            lines.append(f"left out when it was recorded, as messages of other publishers: {named}")
         return [*lines, *self._run_remarks]
 
     @property

@@ -1,18 +1,23 @@
 """Recovery of bags that were cut or damaged."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import BinaryIO
 
 from mcap.records import Attachment, Channel, Message, MessageIndex, Metadata, Schema
 from mcap.summary import Summary
 
-from formation_gnc.recording.files import missing_files
-from formation_gnc.recording.mcap_file import mcap_files, verified_summary
+from formation_gnc.errors import BagError
+from formation_gnc.recording.files import COMPRESSED, bag_files, missing_files, unpacker
+from formation_gnc.recording.mcap_file import verified_summary
 from formation_gnc.recording.salvage import Group, SalvageReader
+from formation_gnc.recording.sqlite_salvage import SqliteSalvage
 from formation_gnc.recording.topic_definition import TopicDefinition
 from formation_gnc.recording.writer import BagWriter
+
+type Unpack = Callable[[bytes], bytes]
 
 WHOLE, NOTHING_SAVED, PARTLY_LOST = 0, 1, 3
 
@@ -40,13 +45,13 @@ def recover(path: Path, output: Path) -> Recovery:
     chunk can be unpacked; `reasons` says so. The new bag's metadata record "recovery" repeats what was lost.
 
     Args:
-        path: bag directory or .mcap file.
+        path: bag directory, .mcap or .db3 file.
         output: directory of the new bag, which must not exist.
 
     Raises:
         BagError: the bag does not exist, or the output does.
     """
-    surveys = [_surveyed(file) for file in mcap_files(path)]
+    surveys = [_surveyed(file) for file in bag_files(path)]
     reasons = tuple(reason for survey in surveys for reason in survey.reasons) + tuple(missing_files(path))
     saved = sum(survey.saved.total() for survey in surveys)
     lost: Counter[str] = Counter()
@@ -58,7 +63,9 @@ def recover(path: Path, output: Path) -> Recovery:
         return Recovery(WHOLE, None, saved, {}, ())
     reasons += tuple(_leave_out_other_types(surveys, lost))
     saved = sum(survey.saved.total() for survey in surveys)
-    _write(surveys, output, {"source": str(path), "lost": str(dict(lost)), "reasons": "\n".join(reasons)})
+    _write(
+        surveys, output, {"source": str(path), "lost": str(dict(lost)), "reasons": "\n".join(reasons)}, unpacker(path)
+    )
     return Recovery(PARTLY_LOST if reasons else WHOLE, output, saved, dict(lost), reasons)
 
 
@@ -100,18 +107,23 @@ class _Survey:
                 self.reasons.append(f"{self.path}: the definition of channel {channel_id} is lost")
 
 
+def _reader(path: Path, stream: BinaryIO) -> SalvageReader | SqliteSalvage:
+    return SqliteSalvage(path) if path.suffix == ".db3" else SalvageReader(stream)
+
+
 def _surveyed(path: Path) -> _Survey:
     """Read a file once, without keeping its messages."""
     survey = _Survey(path)
     found: Counter[int] = Counter()
     missing: Counter[int] = Counter()
     from_damaged: Counter[int] | None = None  # messages found in the chunk before, if that is damaged
+    if path.suffix == COMPRESSED:
+        raise BagError(f"{path}: is compressed as a whole; unpack it first, as by `zstd -d`")
     with path.open("rb") as stream:
         summary = verified_summary(stream)
         if summary is not None:
-            survey.indexed = True
             survey.schemas, survey.channels = summary.schemas, summary.channels
-        reader = SalvageReader(stream)
+        reader = _reader(path, stream)
         for record in reader.records():
             match record:
                 case Group():
@@ -126,7 +138,7 @@ def _surveyed(path: Path) -> _Survey:
                 case Attachment():
                     survey.attachments[record.name] = record.data
         survey.reasons = reader.reasons
-        survey.indexed = survey.indexed and not reader.has_wrong_lengths
+        survey.indexed = (summary is not None or isinstance(reader, SqliteSalvage)) and not reader.has_wrong_lengths
     survey.count(found, _missing(summary, found, missing))
     return survey
 
@@ -152,8 +164,8 @@ def _leave_out_other_types(surveys: list[_Survey], lost: Counter[str]) -> Iterat
                 yield f"{survey.path}: topic {channel.topic} has messages of a second type, {kind[0] or 'unknown'}"
 
 
-def _write(surveys: list[_Survey], output: Path, report: dict[str, str]) -> None:
-    """Write everything readable into a new bag."""
+def _write(surveys: list[_Survey], output: Path, report: dict[str, str], unpack: Unpack | None) -> None:
+    """Write everything readable into a new bag, whose messages are plain."""
     metadata = {name: values for survey in surveys for name, values in survey.metadata.items()}
     metadata.pop("rosbag2", None)
     attachments = {name: data for survey in surveys for name, data in survey.attachments.items()}
@@ -165,13 +177,13 @@ def _write(surveys: list[_Survey], output: Path, report: dict[str, str]) -> None
                 if (schema is not None or not channel.schema_id) and channel.topic not in added:
                     added.add(channel.topic)
                     writer.add_defined_topic(channel.topic, TopicDefinition.recorded(schema, channel))
-            _copy_messages(survey, writer)
+            _copy_messages(survey, writer, unpack or bytes)
 
 
-def _copy_messages(survey: _Survey, writer: BagWriter) -> None:
+def _copy_messages(survey: _Survey, writer: BagWriter, unpack: Unpack) -> None:
     with survey.path.open("rb") as stream:
-        for record in SalvageReader(stream).records():
+        for record in _reader(survey.path, stream).records():
             for item in record.records if isinstance(record, Group) else ():
                 if isinstance(item, Message) and item.channel_id in survey.saved:
                     topic = survey.channels[item.channel_id].topic
-                    writer.write(topic, item.data, item.log_time, item.sequence)
+                    writer.write(topic, unpack(item.data), item.log_time, item.sequence)

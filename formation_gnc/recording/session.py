@@ -1,16 +1,17 @@
 """Recording of a run: messages, losses, progress and parameters."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import MODULES
+from formation_gnc.flight.sources import SourceLock, is_shared
 from formation_gnc.parameters import to_json
 from formation_gnc.recording.layout import LAYOUT, foxglove_layout
 from formation_gnc.recording.loss import LossCounter
 from formation_gnc.recording.parameter_collection import PLANT, ParameterCollection
 from formation_gnc.recording.progress import NONE, RecordingProgress
-from formation_gnc.recording.provenance import LOST, parameters_record
+from formation_gnc.recording.provenance import IGNORED, LOST, parameters_record
 from formation_gnc.recording.snapshot import Snapshot
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.records import Event
@@ -51,34 +52,40 @@ class RecordingSession:
         self._snapshot = Snapshot(bag, snapshot) if snapshot else None
         self._write = self._snapshot.write if self._snapshot else bag.write
         self._losses: dict[str, LossCounter] = {}
-        self._lost = 0
+        self._locks: dict[str, SourceLock] = {}
+        self._said = [0, 0]
         self._received = True
 
     def open_topic(
-        self, topic: str, type_name: str, publishers: Callable[[], int], latched: bool
+        self, topic: str, type_name: str, publishers: Callable[[], Sequence[str]], latched: bool
     ) -> Callable[[bytes, int, int | None], None]:
         """Add a topic to the bag.
 
         Args:
             topic: full name.
             type_name: of its messages.
-            publishers: how many there are just now.
+            publishers: full names of the nodes that publish it just now, once for each publisher.
             latched: whether late subscribers get what was published before.
 
         Returns:
             What takes its messages: CDR bytes, stamp in ns, and the publisher's sequence number if there is one.
+            Of a topic with a message at every tick, those of other publishers are left out (:class:`SourceLock`).
         """
         self.bag.add_topic(topic, type_name, topics.QUEUE_DEPTH)
-        loss = self._losses[topic] = LossCounter(publishers, latched)
-        node = _answering(topic)
+        loss = self._losses[topic] = LossCounter(lambda: len(publishers()), latched)
+        lock, node = SourceLock(), _answering(topic)
         is_ours = type_name in topics.types_of(topic)
         is_clock, is_events = is_ours and topic == topics.CLOCK.name, is_ours and topic == topics.EVENTS.name
         concerns_progress = is_ours and self.progress.concerns(topic)
+        if is_ours and topic in topics.of_one_publisher(topics.deputy_of(topic)):
+            self._locks[topic] = lock
         count = 0
 
         def take(data: bytes, stamp: int, number: int | None) -> None:
             nonlocal count
             self._received = True
+            if topic in self._locks and not lock.accepts(stamp, number, lambda: is_shared(publishers())):
+                return
             count += 1
             if number is not None:
                 loss.take(number)
@@ -86,7 +93,7 @@ class RecordingSession:
                 self.parameters.restarted(node, stamp)
             self._write(topic, data, stamp, number or count)
             if concerns_progress:
-                self.progress.take(topic, stamp, publishers)
+                self.progress.take(topic, stamp, lambda: len(publishers()))
             elif is_events:
                 self.progress.take_event(self._decode_event(data))
             if is_clock and count % REPORT_TICKS == 0:
@@ -122,14 +129,22 @@ class RecordingSession:
         self.while_disk_lasts(write)()
         return bool(written), written[0] if written else str(self.failure)
 
-    def new_losses(self) -> dict[str, int]:
-        """Messages lost so far by topic, if there are more than at the last call; else empty."""
-        lost = {topic: each.lost for topic, each in self._losses.items() if each.lost}
-        total = sum(lost.values())
-        if total <= self._lost:
-            return {}
-        self._lost = total
-        return lost
+    def new_troubles(self) -> list[str]:
+        """What has been lost, or left out as other publishers', since the last call, in words."""
+        found = {f"lost so far: {_counts(self.lost_by_topic)}": self.lost}
+        found[f"left out so far, of other publishers: {_counts(self.ignored)}"] = sum(self.ignored.values())
+        said, self._said = self._said, list(found.values())
+        return [text for (text, total), before in zip(found.items(), said, strict=True) if total > before]
+
+    @property
+    def lost_by_topic(self) -> dict[str, int]:
+        """Messages lost so far by topic, where there are any."""
+        return {topic: each.lost for topic, each in self._losses.items() if each.lost}
+
+    @property
+    def ignored(self) -> dict[str, int]:
+        """Messages of other publishers left out so far by topic, where there are any."""
+        return {topic: each.ignored for topic, each in self._locks.items() if each.ignored}
 
     @property
     def lost(self) -> int:
@@ -157,7 +172,13 @@ class RecordingSession:
         """Finish the bag."""
         if self.failure is None:
             self.bag.add_metadata(LOST, {topic: str(each.lost) for topic, each in self._losses.items()})
+            if self.ignored:
+                self.bag.add_metadata(IGNORED, {topic: str(count) for topic, count in self.ignored.items()})
             self.bag.close()
+
+
+def _counts(by_topic: Mapping[str, int]) -> str:
+    return ", ".join(f"{count} of {topic}" for topic, count in by_topic.items())
 
 
 def _answering(topic: str) -> str:

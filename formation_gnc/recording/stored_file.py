@@ -2,6 +2,7 @@
 
 from array import array
 from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -92,11 +93,23 @@ class _Stamps:
         self.is_own = series.is_own
         self.repeats = 0
         """Messages equal to one before them with the same stamp."""
+        self.misfits = 0
+        """Messages that are none of the type: cut, or encoded otherwise."""
         self._same: list[bytes] = []
-        try:
-            self.has_header = type_of(series).is_stamped
-        except BagError:
-            self.has_header = False
+        self._kind: MessageType | None = None
+        self._seen: dict[tuple[bytes, int], bool] = {}
+        with suppress(BagError):
+            self._kind = type_of(series)
+        self.has_header = self._kind is not None and self._kind.is_stamped
+
+    def fits(self, data: bytes) -> bool:
+        """Whether a message is one of the type, as far as its length tells once one of that length was."""
+        if self._kind is None:
+            return True
+        key = data[:2], len(data)
+        if key not in self._seen:
+            self._seen[key] = self._kind.fits(data)
+        return self._seen[key] or self._kind.fits(data)
 
     def add(self, stamp: int, data: bytes) -> None:
         values = self.values
@@ -157,6 +170,8 @@ class StoredFile:
         series_of = {channel: series for channel, series in self._channels.items() if series in wanted}
         for channel, data, sequence in self._span_records(span, series_of):
             series = series_of[channel]
+            if not self._stamps[series].fits(data):
+                continue
             row = rows[series] = rows.get(series, 0) + 1
             stamps = self._stamps[series]
             if row <= len(stamps.values):
@@ -172,6 +187,10 @@ class StoredFile:
             return np.zeros(0, dtype=np.int64)
         values = np.frombuffer(known.values, dtype=np.int64)
         return values.view(np.uint64) if known.is_unsigned else values  # type: ignore[return-value]
+
+    def misfits(self, series: Series) -> int:
+        """Messages of a series that are left out, being none of its type."""
+        return self._stamps[series].misfits if series in self._stamps else 0
 
     def repeats(self, series: Series) -> int:
         """Messages of a series equal to one right before them."""
@@ -201,10 +220,13 @@ class StoredFile:
         if series is None:
             self.orphans += 1
             return
-        stamps = self._stamps[series]
+        stamps, data = self._stamps[series], self._unpack(data)
+        if not stamps.fits(data):
+            stamps.misfits += 1
+            return
         stamp = log_time
         if stamps.has_header:
-            stamp = self._header_stamp(self._unpack(data), log_time, stamps.is_own)
+            stamp = self._header_stamp(data, log_time, stamps.is_own)
             if stamps.is_own and stamp >= 0:
                 if self._latest is None and stamp != log_time:
                     self._restamp(stamp)
@@ -216,11 +238,8 @@ class StoredFile:
 
     @staticmethod
     def _header_stamp(data: bytes, log_time: int, is_own: bool) -> int:
-        """Stamp in the header; the log time of a message that is too short, or of others' whose header is not set."""
-        time = _TIME.get(data[:2])
-        if time is None or len(data) < _BODY + time.size:
-            return log_time
-        seconds, nanoseconds = time.unpack_from(data, _BODY)
+        """Stamp in the header; the log time of others' messages whose header is not set."""
+        seconds, nanoseconds = _TIME[data[:2]].unpack_from(data, _BODY)
         stamp = int(seconds) * NANOSECONDS + int(nanoseconds)
         return stamp if stamp > 0 or (is_own and stamp == 0) else log_time
 

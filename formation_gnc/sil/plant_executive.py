@@ -1,11 +1,12 @@
 """Runs the plant on the node graph: start, deadlines, pace, a recorder that lags, reports, the end."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, Protocol
 
 from formation_gnc.flight import topics
 from formation_gnc.flight.barrier import Decision
-from formation_gnc.flight.graph import COMMAND
+from formation_gnc.flight.graph import COMMAND, GRAPH
+from formation_gnc.flight.sources import is_shared, names_of, shared
 from formation_gnc.plant.parameters import PlantParameters
 from formation_gnc.records import Thrust
 from formation_gnc.sil.report import Report
@@ -22,12 +23,12 @@ RECORDER = "/recorder"
 CONTRADICTIONS = 3
 """Contradicting answers of a deputy that show two commanders; one that is started again may contradict itself once."""
 
+LINGERING = 30.0
+"""Wall time (s) after which DDS has forgotten a node that was killed: two of one name for longer are two."""
+
 
 class Surroundings(Protocol):
     """The graph as the executive sees it, and its outputs."""
-
-    def is_published(self, topic: str) -> bool:
-        """Whether anybody publishes a topic."""
 
     def has_recorder(self) -> bool:
         """Whether a recorder reports progress."""
@@ -36,7 +37,7 @@ class Surroundings(Protocol):
         """Whether a recorder has subscribed to every topic of the run, and knows all parameters."""
 
     def publishers_of(self, topic: str) -> list[str]:
-        """Full names of the nodes that publish a topic, this one included."""
+        """Full names of the nodes that publish a topic, once for each publisher, this one's included."""
 
     def publish(self, topic: str, record: Any) -> None:
         """Publish a record."""
@@ -64,8 +65,10 @@ class PlantExecutive:
         self._said = ""
         deputies = parameters.deputies
         self._own = (topics.CLOCK.name, topics.TRUTH.name, *map(topics.MEASUREMENT.of, deputies))
+        self._answers = [topic.of(deputy) for deputy in deputies for row in GRAPH for topic in row.gives]
         self._commands = {COMMAND.of(deputy): deputy for deputy in deputies}
         self._troubles: dict[str, None] = {}
+        self._shared_since: dict[str, float] = {}
 
     @property
     def finished(self) -> bool:
@@ -83,7 +86,7 @@ class PlantExecutive:
             self._say_what_is_awaited(barrier.decide(now))
             self.advance_if_ready(now)
             if now - self._reported > REPORT_PERIOD and not self.finished:
-                self._note_troubles()
+                self._note_troubles(now)
                 self._report("flying", now)
         return self.finished
 
@@ -126,32 +129,36 @@ class PlantExecutive:
             self._began = now
             self.simulation.open_tick(now, self._publish)
 
-    def _rivals(self) -> Iterator[str]:
-        """Who else publishes what the plant does, in words."""
-        for topic in self._own:
-            publishers = self._around.publishers_of(topic)
-            if len(publishers) > 1:
-                yield f"only one publisher of {topic}: {' and '.join(sorted(publishers))} are in this ROS domain"
+    def _rivals(self, topics_of_one: Sequence[str]) -> Iterator[str]:
+        """Topics that must have one publisher and have several, in words."""
+        for topic, names in shared(topics_of_one, self._around.publishers_of):
+            yield f"only one publisher of {topic}: {names} are in this ROS domain"
 
-    def _note_troubles(self) -> None:
+    def _note_troubles(self, now: float) -> None:
         """Publish, once each, that more than one node does what one has to."""
-        found = [f"needs {rivals}" for rivals in self._rivals()]
-        for topic in (topics.PROGRESS.name, *self._commands):
+        found = [f"needs {rivals}" for rivals in self._rivals(self._own)]
+        for topic in (topics.PROGRESS.name, *self._answers):
             publishers = self._around.publishers_of(topic)
             contradicts = self.simulation.barrier.contradictions[self._commands.get(topic, "")] >= CONTRADICTIONS
-            if len(set(publishers)) > 1 or contradicts:
-                found.append(f"{topic} has several publishers: {' and '.join(sorted(publishers))}")
+            since = self._shared_since.setdefault(topic, now) if len(publishers) > 1 else now
+            if len(publishers) < 2:
+                self._shared_since.pop(topic, None)
+            if is_shared(publishers) or contradicts or now - since > LINGERING:
+                found.append(f"{topic} has several publishers: {names_of(publishers)}")
         for trouble in found:
             if trouble not in self._troubles:
                 self._troubles[trouble] = None
                 self._publish(topics.EVENTS.name, self.simulation.warning(trouble))
 
     def _absent(self) -> list[str]:
-        return list(self.simulation.unattended(self._around.is_published))
+        return [topic for topic, _ in self.simulation.answers() if not self._around.publishers_of(topic)]
 
     def _missing(self) -> Iterator[str]:
-        yield from self._absent()
-        yield from self._rivals()
+        absent = self._absent()
+        if absent:
+            modules = dict(self.simulation.answers())
+            yield f"a publisher of {', '.join(f'{topic} ({modules[topic]})' for topic in absent)}"
+        yield from self._rivals((*self._own, *self._answers))
         if self._parameters.wait_for_recorder and not (
             self.simulation.barrier.recorded is not None and self._around.recorder_listens()
         ):

@@ -14,13 +14,16 @@ import yaml
 
 import formation_gnc
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.flight.graph import GRAPH, PLANT
+from formation_gnc.flight.graph import GRAPH, MODULES, PLANT
 from formation_gnc.parameter_yaml import RejectedYamlError
-from formation_gnc.parameters import dump, load, read_yaml
+from formation_gnc.parameters import OWN_OF_ROS, dump, leaves, load, read_yaml
 from formation_gnc.plant.parameters import PlantParameters
 from formation_gnc.sil.following import SHARED, departures, with_followed
 
 SECTION = "ros__parameters"
+
+ALL = "**"
+"""Pattern of all nodes: what it gives a node that has no such parameter is another's, as every node has it."""
 
 RUN_NODES = (PLANT, "/recorder", "/display", "/replay")
 """Nodes that are one per run, some only when asked."""
@@ -48,6 +51,8 @@ class Scenario:
     """Parameters of every deputy's modules, by deputy and module."""
     others: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     """What the run's other nodes are given, by full name, unchecked; what all share is the plant's."""
+    ignored: tuple[str, ...] = ()
+    """Parameters that the file gives all nodes and none of these has."""
 
     def parameters(self) -> dict[str, dict[str, Any]]:
         """All parameters by full node name, then by dotted name."""
@@ -97,21 +102,36 @@ def load_scenario(name: str, overrides: Mapping[str, Mapping[str, Any]] | None =
     from formation_gnc.guidance.fleet_checks import check_fleet  # nodes that only read their section need no guidance
 
     path = find_scenario(name)
-    written, overriding = _sections(path), list((overrides or {}).items())
-    sections = [*written, *overriding]
+    written = _sections(path)
+    given_to_all = {name for pattern, section in written if pattern.strip("/") == ALL for name in section}
+    # What is given on top is meant for every node that it is given to.
+    on_top = [
+        (f"/{ALL}/*" if pattern.strip("/") == ALL else pattern, values) for pattern, values in (overrides or {}).items()
+    ]
+    sections = [*written, *on_top]
     listed = _given(sections, PLANT).get("deputies", DEFAULT_DEPUTIES)
     deputies = listed if isinstance(listed, list | tuple) else ()
     _check_sections(str(path), written, deputies, RUN_NODES)
-    _check_sections(f"{path.name}: overrides", overriding, deputies, (PLANT,))
+    _check_sections(f"{path.name}: overrides", on_top, deputies, (PLANT,))
     try:
-        plant = _load(PlantParameters, _given(sections, PLANT), PLANT)
+        plant = _load(PlantParameters, _given(sections, PLANT, PlantParameters), PLANT)
         modules = {deputy: _load_modules(sections, dump(plant), deputy) for deputy in plant.deputies}
         check_fleet({deputy: each["guidance"] for deputy, each in modules.items()})
     except ConfigurationError as error:
         raise ConfigurationError(f"{path.name}: {error}") from None
-    given = {node: _given(sections, node) for node in RUN_NODES if node != PLANT}
-    own = {node: {name: each for name, each in values.items() if name not in SHARED} for node, values in given.items()}
-    return Scenario(path.stem, plant, modules, {node: values for node, values in own.items() if values})
+    ignored = given_to_all.difference(
+        *(dump(each) for each in (plant, *(module for own in modules.values() for module in own.values())))
+    )
+    addressed = [(pattern, values) for pattern, values in sections if pattern.strip("/") != ALL]
+    others = {node: _given(addressed, node) for node in RUN_NODES if node != PLANT}
+    own = {node: {name: each for name, each in values.items() if name not in SHARED} for node, values in others.items()}
+    return Scenario(
+        path.stem,
+        plant,
+        modules,
+        {node: values for node, values in own.items() if values},
+        tuple(sorted(name for name in ignored if not _is_of_ros(name))),
+    )
 
 
 def _load_modules(sections: Sections, plant: Mapping[str, Any], deputy: str) -> dict[str, Any]:
@@ -119,9 +139,8 @@ def _load_modules(sections: Sections, plant: Mapping[str, Any], deputy: str) -> 
     loaded = {}
     for row in GRAPH:
         node = f"/{deputy}/{row.name}"
-        loaded[row.name] = _load(
-            row.parameters, with_followed(row.parameters, _given(sections, node), plant, deputy), node
-        )
+        given = _given(sections, node, row.parameters)
+        loaded[row.name] = _load(row.parameters, with_followed(row.parameters, given, plant, deputy), node)
     return loaded
 
 
@@ -148,7 +167,7 @@ def given_to(path: Path, node: str, deputies: Sequence[str]) -> dict[str, Any]:
     """
     sections = _sections(path)
     _check_sections(str(path), sections, deputies, RUN_NODES)
-    return _given(sections, node)
+    return _given(sections, node, MODULES[node.rpartition("/")[2]].parameters)
 
 
 def _check_sections(source: str, sections: Sections, deputies: Sequence[Any], run_nodes: Sequence[str]) -> None:
@@ -192,12 +211,22 @@ def _load(schema: Any, values: Mapping[str, Any], node: str) -> Any:
         raise ConfigurationError(f"{node}: {error}") from None
 
 
-def _given(sections: Sections, node: str) -> dict[str, Any]:
+def _given(sections: Sections, node: str, schema: Any = None) -> dict[str, Any]:
+    """Values for a node, without those of rclpy's own; with its schema, also without what is meant for other nodes."""
     values: dict[str, Any] = {}
+    for_all = set[str]()
     for pattern, section in sections:
         if matches(pattern, node):
             values |= section
-    return values
+            for_all = for_all | section.keys() if pattern.strip("/") == ALL else for_all - section.keys()
+    known = {leaf.name for leaf in leaves(schema, values)} if schema else values.keys()
+    return {
+        name: value for name, value in values.items() if not _is_of_ros(name) and (name in known or name not in for_all)
+    }
+
+
+def _is_of_ros(name: str) -> bool:
+    return name.startswith(OWN_OF_ROS)
 
 
 def matches(pattern: str, node: str) -> bool:

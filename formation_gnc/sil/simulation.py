@@ -49,15 +49,11 @@ class Simulation:
         """Whether the first tick is open."""
         return self.barrier.stamp >= 0
 
-    def unattended(self, is_published: Callable[[str], bool]) -> Iterator[str]:
-        """Full names of the modules without whose answers the run cannot start.
-
-        is_published: whether anybody publishes a topic; a module of whatever name counts by what it publishes.
-        """
+    def answers(self) -> Iterator[tuple[str, str]]:
+        """Full names of the topics by which modules answer a tick, each with the module's name in the graph table."""
         for deputy in self.parameters.deputies:
             for row in GRAPH:
-                if not is_published(row.answer.of(deputy)):
-                    yield f"/{deputy}/{row.name}"
+                yield row.answer.of(deputy), row.name
 
     def open_tick(self, now: float, publish: Sink) -> None:
         """Publish what the plant has to say at the current tick; measurements first, since everybody waits for them."""
@@ -75,7 +71,7 @@ class Simulation:
     def advance_if_ready(self, now: float, publish: Sink, absent: Callable[[], Collection[str]] = tuple) -> Decision:
         """Fly the tick if it is over, and open the next; returns what the barrier said.
 
-        absent: asked for the nodes that are not there as far as is known, when there is a miss to explain.
+        absent: asked for the answers that nobody publishes as far as is known, when there is a miss to explain.
         """
         decision = self.barrier.decide(now)
         if decision.advance and not self.plant.finished:
@@ -89,7 +85,7 @@ class Simulation:
         plant = self.plant
         tick, time = plant.tick, plant.time
         for name in plant.step(self.barrier.answers):
-            reason = self.barrier.reason_of_miss(name, [node for node in absent() if topics.deputy_of(node) == name])
+            reason = self.barrier.reason_of_miss(name, [topic for topic in absent() if topics.deputy_of(topic) == name])
             publish(topics.EVENTS.name, _event(time, tick, EventKind.MISS, f"{reason}: no thrust", name))
             self.misses += 1
         for event in plant.take_events():

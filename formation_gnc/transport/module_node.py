@@ -11,6 +11,7 @@ from rclpy.service import Service
 
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import ModuleInstance, Row
+from formation_gnc.flight.sources import SourceLock
 from formation_gnc.flight.synchronizer import HISTORY
 from formation_gnc.parameters import dump
 from formation_gnc.records import WARNINGS, Event, EventKind, Timing
@@ -65,6 +66,7 @@ class ModuleNode(ConfiguredNode):
         self._catch_up_soon = self.create_wall_timer(SETTLING, self._catch_up)
         self._catch_up_soon.cancel()
         self._decoders: dict[str, Callable[[bytes], Any]] = {}
+        self._locks: dict[str, SourceLock] = {}
         for topic, record in {**self._instance.inputs, **self._instance.inputs_of_others}.items():
             self._subscribe_input(topic, record)
         self._answered, self._warning = 0, ""
@@ -91,7 +93,7 @@ class ModuleNode(ConfiguredNode):
             self._bus.subscribe(topic, partial(self._take, topic))
         else:
             self._decoders[topic] = codec(record).decode
-            self.subscribe(record, topic, partial(self._receive, topic), INPUT_DEPTH)
+            self._locks[topic] = self.subscribe_to_source(record, topic, partial(self._receive, topic), INPUT_DEPTH)
 
     def _receive(self, topic: str, data: bytes, about: Information) -> None:
         published = about["source_timestamp"]
@@ -146,14 +148,18 @@ class ModuleNode(ConfiguredNode):
     def _diagnose(self) -> None:
         """Publish whether it answers, and what has happened since it was last told."""
         level, message = DiagnosticStatus.OK, "answering"
+        ignored = [topic for topic, lock in self._locks.items() if lock.ignored]
         if not self._answered:
             level, message = DiagnosticStatus.WARN, f"waiting for {' and '.join(self._instance.inputs)}"
         elif self._module.waiting_for:
             level, message = DiagnosticStatus.WARN, f"waiting for {self._module.waiting_for}"
         elif self._warning:
             level, message = DiagnosticStatus.WARN, self._warning
+        elif ignored:
+            level, message = DiagnosticStatus.WARN, f"ignored those of other nodes on {' and '.join(ignored)}"
         self._warning = ""
         values = {"tick": self._module.time // self._module.parameters.tick_ns, "answered": self._answered}
+        values["ignored"] = sum(lock.ignored for lock in self._locks.values())
         self._diagnostics.publish(level, message, values, self._module.time)
 
     def stage_parameters(self, changes: Mapping[str, Any]) -> tuple[Any, Callable[[], None]]:

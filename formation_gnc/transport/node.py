@@ -23,6 +23,7 @@ except ImportError:  # missing in other builds of Jazzy; slower, same behaviour
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight.graph import PLANT
+from formation_gnc.flight.sources import SourceLock, is_shared
 from formation_gnc.flight.topics import QUEUE_DEPTH
 from formation_gnc.parameters import OWN_OF_ROS, Leaf, change, dump, leaves, load, read_yaml
 from formation_gnc.records import WARNINGS, Event, EventKind
@@ -31,7 +32,7 @@ from formation_gnc.transport.conversion import codec, message_type
 from formation_gnc.transport.parameter_arguments import given_parameters, without_parameters
 from formation_gnc.transport.process import stop_requested
 from formation_gnc.transport.qos import LATEST, quality
-from formation_gnc.transport.subscriptions import Information, subscribe_to_all
+from formation_gnc.transport.subscriptions import Information, first_stamp, names, subscribe_to_all
 
 Executor: Any = EventsExecutor
 
@@ -166,6 +167,27 @@ class ConfiguredNode(Node):  # type: ignore[misc]
         depth: messages kept between two callbacks, the latest.
         """
         subscribe_to_all(self, message_type(record), self.full_name(topic), callback, depth)
+
+    def subscribe_to_source(
+        self, record: type, topic: str, callback: Callable[[bytes, Information], object], depth: int = QUEUE_DEPTH
+    ) -> SourceLock:
+        """As `subscribe`; where several nodes publish the topic, to the one that is heard (:class:`SourceLock`).
+
+        depth: all share it, so that a burst of other nodes' messages must not push out the one that is awaited.
+        """
+        lock = SourceLock()
+
+        def receive(data: bytes, about: Information) -> None:
+            number = about["publication_sequence_number"]
+            if lock.accepts(first_stamp(data), number, lambda: is_shared(self.publishers_of(topic))):
+                callback(data, about)
+
+        self.subscribe(record, topic, receive, depth)
+        return lock
+
+    def publishers_of(self, topic: str) -> list[str]:
+        """Full names of the nodes that publish a topic, once for each publisher."""
+        return names(self.get_publishers_info_by_topic(self.full_name(topic)))
 
     def subscribe_decoded(self, record: type, topic: str, callback: Callable[[Any], object]) -> None:
         """As `subscribe`, with the record of the latest message."""

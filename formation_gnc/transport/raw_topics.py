@@ -1,7 +1,7 @@
 """Every topic of a graph as it comes: bytes, stamped with simulated time, numbered by its publishers."""
 
-import struct
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -10,10 +10,10 @@ from rclpy.qos import QoSDurabilityPolicy, QoSProfile, QoSReliabilityPolicy
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
+from formation_gnc.flight.sources import SourceLock, is_shared
 from formation_gnc.transport.conversion import message_class
 from formation_gnc.transport.qos import quality
-from formation_gnc.transport.subscriptions import with_information
-from formation_gnc.types import NANOSECONDS
+from formation_gnc.transport.subscriptions import first_stamp, names, with_information
 
 Callback = Callable[[bytes, int, int | None], None]
 """Takes a message's CDR bytes, stamp in ns and its publisher's sequence number, if the middleware has one."""
@@ -66,19 +66,23 @@ class RawTopics:
         kind = message_class(type_name)
         qos = self._offered(topic)
         take = self._open(name, type_name, qos.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL)
-        is_clock = name == topics.CLOCK.name
+        is_clock, lock = name == topics.CLOCK.name, SourceLock()
         stamped = is_clock or "std_msgs/Header" in list(kind.get_fields_and_field_types().values())[:1]
 
         def receive(data: bytes, about: dict[str, Any]) -> None:
             stamp = first_stamp(data) if stamped else self._time
             if stamp < 0:  # of somebody else's making: ours has no time before 0
                 stamp = self._time
-            if is_clock:
+            number = about["publication_sequence_number"]
+            if is_clock and lock.accepts(stamp, number, partial(self._is_shared, topic)):
                 self._time = stamp
-            take(data, stamp, about["publication_sequence_number"])
+            take(data, stamp, number)
 
         self._receivers[topic] = (kind, with_information(receive))
         self._subscribe_to_offers(topic)
+
+    def _is_shared(self, topic: str) -> bool:
+        return is_shared(names(self._node.get_publishers_info_by_topic(topic)))
 
     def _name_of(self, topic: str, type_name: str) -> str | None:
         """Name of a topic within the formation; None for one of another."""
@@ -105,9 +109,3 @@ class RawTopics:
         self._subscriptions[topic] = self._node.create_subscription(
             kind, topic, receive, self._offered(topic), raw=True, event_callbacks=events
         )
-
-
-def first_stamp(data: bytes) -> int:
-    """The stamp that a message begins with, in ns: after four bytes that tell how it is encoded."""
-    seconds, nanoseconds = struct.unpack_from("<iI", data, 4)
-    return int(seconds * NANOSECONDS + nanoseconds)

@@ -1,14 +1,17 @@
 """Subscriptions that hear every writer, whatever quality of service it offers."""
 
-from collections.abc import Callable
+import struct
+from collections.abc import Callable, Iterable
 from functools import wraps
 from typing import Any
 
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSDurabilityPolicy, QoSPolicyKind, QoSReliabilityPolicy
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from formation_gnc.transport.qos import quality
+from formation_gnc.types import NANOSECONDS
 
 Information = dict[str, Any]
 """What is known of a message: `source_timestamp` (ns, system clock), `publication_sequence_number` and others."""
@@ -50,3 +53,14 @@ def with_information(receive: Callable[[bytes, Information], object]) -> Callabl
         receive(data, about)
 
     return call
+
+
+def names(endpoints: Iterable[TopicEndpointInfo]) -> list[str]:
+    """Full names of the nodes that publish or subscribe."""
+    return [f"{each.node_namespace.rstrip('/')}/{each.node_name}" for each in endpoints]
+
+
+def first_stamp(data: bytes) -> int:
+    """The stamp that a message begins with, in ns: after four bytes that tell how it is encoded."""
+    seconds, nanoseconds = struct.unpack_from("<iI", data, 4)
+    return int(seconds * NANOSECONDS + nanoseconds)

@@ -10,7 +10,7 @@ from formation_gnc.analysis.run_history import RunHistory
 from formation_gnc.analysis.separation import minimum_separation
 from formation_gnc.analysis.thinning import POINTS, Thinned
 from formation_gnc.analysis.timeline import Mark
-from formation_gnc.analysis.trajectory import deputies_of, trajectory
+from formation_gnc.analysis.trajectory import deputies_of, trajectories
 from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.sil.runner import Run
@@ -36,7 +36,7 @@ def history(bag: Bag) -> RunHistory:
 def test_a_short_run_is_complete(bag: Bag, history: RunHistory) -> None:
     whole = figures(bag)
     for name, deputy in history.deputies.items():
-        path = trajectory(bag, name)
+        path = trajectories(bag)[name]
         assert np.array_equal(deputy.truth, path.truth)
         assert np.array_equal(deputy.estimation_error, path.estimation_error)
         assert np.array_equal(deputy.control_error[:, :3], path.error)

@@ -63,8 +63,8 @@ def test_a_later_answer_is_missed_at_the_deadline() -> None:
     lock.check(DEADLINE + 0.01)
     assert lock.decide(DEADLINE + 0.01) == ADVANCE
     assert lock.answers == {"deputy2": FORCE}
-    assert lock.reason_of_miss("deputy1", ["/deputy1/navigation"]) == (
-        "did not answer within 2 s (/deputy1/navigation not there)"
+    assert lock.reason_of_miss("deputy1", ["/deputy1/estimate"]) == (
+        "did not answer within 2 s (nobody publishes /deputy1/estimate)"
     )
 
 

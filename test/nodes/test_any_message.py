@@ -167,7 +167,9 @@ def test_the_recorder_stands_any_message_of_any_topic(
     session = RecordingSession(BagWriter(path, provenance(), {}), "any", reported.append, codec(Event).decode)
     for topic, record_type in ours:
         wrong = data.draw(st.booleans())
-        take = session.open_topic(topic, "std_msgs/msg/String" if wrong else type_name(record_type), lambda: 1, True)
+        take = session.open_topic(
+            topic, "std_msgs/msg/String" if wrong else type_name(record_type), lambda: ["/somebody"], True
+        )
         for _ in range(2):
             message = b"\0\1\0\0\1\0\0\0\0" if wrong else to_cdr(data.draw(any_record(record_type)))
             take(message, data.draw(st.integers(0, 2**62)), data.draw(st.integers(1, 3)))

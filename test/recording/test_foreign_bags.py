@@ -1,8 +1,11 @@
 """Bags that others wrote, merged, cut or reordered: read by their data and by header stamp, run by run."""
 
 import random
+import shutil
+import sqlite3
 import struct
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import closing
 from itertools import batched
 from pathlib import Path
 
@@ -239,3 +242,87 @@ def second_chunk(content: bytes) -> int:
         if found == 2:
             return offset
         offset += 9 + length
+
+
+def write_sqlite(path: Path, messages: Iterable[Written]) -> Path:
+    """A file as rosbag2's own storage plug-in lays it out."""
+    with closing(sqlite3.connect(path)) as database, database:
+        database.executescript(
+            "CREATE TABLE schema(schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL);"
+            "INSERT INTO schema VALUES (4, 'jazzy');"
+            "CREATE TABLE metadata(id INTEGER PRIMARY KEY, metadata_version INTEGER NOT NULL, metadata TEXT NOT NULL);"
+            "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, serialization_format "
+            "TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL, type_description_hash TEXT NOT NULL);"
+            "CREATE TABLE message_definitions(id INTEGER PRIMARY KEY, topic_type TEXT NOT NULL, encoding TEXT NOT NULL,"
+            " encoded_message_definition TEXT NOT NULL, type_description_hash TEXT NOT NULL);"
+            "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL, "
+            "data BLOB NOT NULL);"
+        )
+        numbers: dict[str, int] = {}
+        for topic, kind, data, time in messages:
+            if topic not in numbers:
+                numbers[topic] = len(numbers) + 1
+                database.execute("INSERT INTO topics VALUES (?, ?, ?, 'cdr', '', '')", (numbers[topic], topic, kind))
+                row = (numbers[topic], kind, "ros2msg", schema_text(kind), "")
+                database.execute("INSERT INTO message_definitions VALUES (?, ?, ?, ?, ?)", row)
+            row = (numbers[topic], time, data)
+            database.execute("INSERT INTO messages(topic_id, timestamp, data) VALUES (?, ?, ?)", row)
+    return path
+
+
+def test_a_whole_sqlite_bag_needs_no_recovery(tmp_path, bag_path, flight) -> None:
+    path = write_sqlite(tmp_path / "other.db3", written(flight, lambda stamp: RECEIVED + stamp))
+    recovery = recover(path, tmp_path / "saved")
+    assert (recovery.status, recovery.saved, recovery.output) == (WHOLE, len(flight), None)
+    assert same(Bag(path), Bag(bag_path))
+
+
+@pytest.mark.parametrize("damage", ["cut", "overwritten"])
+def test_of_a_damaged_sqlite_bag_the_pages_that_can_be_read_are_saved(tmp_path, bag_path, flight, damage) -> None:
+    path = write_sqlite(tmp_path / "other.db3", written(flight, lambda stamp: RECEIVED + stamp))
+    content = bytearray(path.read_bytes())
+    if damage == "cut":
+        del content[len(content) * 3 // 4 :]
+    else:
+        middle = len(content) // 2 // 4096 * 4096
+        content[middle : middle + 4096] = b"\xff" * 4096
+    path.write_bytes(content)
+    recovery = recover(path, tmp_path / "saved")
+    assert recovery.status == PARTLY_LOST
+    assert "cannot be read" in recovery.reasons[-1]
+    assert len(flight) // 2 < recovery.saved < len(flight)
+    saved = {(topic, data) for topic, data, _ in Bag(tmp_path / "saved").messages()}
+    assert saved < {(message.topic, message.data) for message in flight}
+
+
+def test_a_run_whose_beginning_is_not_in_the_bag_says_so(tmp_path, flight) -> None:
+    late = [message for message in flight if message.stamp_ns >= 20 * 10**9]
+    assert (
+        "begins at 20.5 s: the run before that is not in it"
+        in Bag(write_mcap(tmp_path / "late.mcap", written(late))).remarks
+    )
+
+
+@pytest.mark.parametrize("topic", ["/clock", "/truth", "/deputy1/thrust"])
+@pytest.mark.parametrize(
+    "damage",
+    [lambda data: b"", lambda data: data[:6], lambda data: data[:-9], lambda data: b"\0\7" + data[2:]],
+    ids=["no bytes", "no header", "cut", "another encoding"],
+)
+def test_a_message_that_does_not_fit_its_type_is_skipped_and_told(tmp_path, bag_path, flight, topic, damage) -> None:
+    place = next(i for i, message in enumerate(flight) if message.topic == topic and message.stamp_ns > 20 * 10**9)
+    messages = written(flight)
+    messages[place] = (*messages[place][:2], damage(messages[place][2]), messages[place][3])
+    bag = Bag(write_mcap(tmp_path / "other.mcap", messages))
+    assert f"skipped: 1 messages of {topic} that do not fit their type" in bag.remarks
+    kept = [message.stamp_ns for message in flight if message.topic == topic and message is not flight[place]]
+    assert bag.arrays(topic)["stamp_ns"].tolist() == kept
+
+
+def test_plain_messages_are_read_where_the_metadata_says_that_each_is_compressed(tmp_path, bag_path) -> None:
+    bag = tmp_path / "bag"
+    shutil.copytree(bag_path, bag)
+    text = (bag / "metadata.yaml").read_text().replace("compression_mode: ''", "compression_mode: MESSAGE")
+    (bag / "metadata.yaml").write_text(text)
+    assert "MESSAGE" in text
+    assert same(Bag(bag), Bag(bag_path))

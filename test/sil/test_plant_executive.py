@@ -15,7 +15,7 @@ from formation_gnc.sil.simulation import RECORDER_LAG
 
 TICKS = 10
 EVERYBODY = {row.answer.of("deputy1") for row in GRAPH}
-NODES = ", ".join(f"/deputy1/{row.name}" for row in GRAPH)
+ANSWERS = ", ".join(f"{row.answer.of('deputy1')} ({row.name})" for row in GRAPH)
 
 
 class Graph:
@@ -29,11 +29,15 @@ class Graph:
         self.said: list[str] = []
         self.reports: list[Report] = []
 
-    def is_published(self, topic: str) -> bool:
-        return topic in self.published
-
     def publishers_of(self, topic: str) -> list[str]:
-        return ["/plant", *self.others.get(topic, [])] if "deputy1/thrust" not in topic else self.others.get(topic, [])
+        own = {
+            "/clock": "/plant",
+            "/truth": "/plant",
+            "/deputy1/measurement": "/plant",
+            "/recorder/progress": "/recorder",
+        }
+        own |= dict.fromkeys(self.published, "/deputy1/module")
+        return [*([own[topic]] if topic in own else []), *self.others.get(topic, [])]
 
     def has_recorder(self) -> bool:
         return self.recorder
@@ -84,10 +88,10 @@ def complete(graph: Graph) -> Graph:
 
 def test_the_run_starts_when_every_answer_has_a_publisher(graph: Graph) -> None:
     executive = start(graph)
-    assert graph.said == [f"waiting for {NODES}"]
+    assert graph.said == [f"waiting for a publisher of {ANSWERS}"]
     graph.published = EVERYBODY - {COMMAND.of("deputy1")}
     executive.check(0.1)
-    assert graph.said[-1] == "waiting for /deputy1/controller"
+    assert graph.said[-1] == "waiting for a publisher of /deputy1/thrust (controller)"
     assert not graph.messages
     graph.published = set(EVERYBODY)
     executive.check(0.2)
@@ -122,7 +126,7 @@ def test_each_answer_flies_a_tick_and_the_last_ends_the_run(complete: Graph) -> 
     assert len(complete.events(EventKind.END)) == 1, "what comes after the end changes nothing"
 
 
-def test_a_miss_is_told_with_its_reason_and_the_absent_node(complete: Graph) -> None:
+def test_a_miss_is_told_with_its_reason_and_what_nobody_publishes(complete: Graph) -> None:
     executive = start(complete)
     answer(executive, 0.0)
     complete.published.discard(topics.ESTIMATE.of("deputy1"))
@@ -130,7 +134,7 @@ def test_a_miss_is_told_with_its_reason_and_the_absent_node(complete: Graph) -> 
         executive.check(float(now))
     (miss,) = complete.events(EventKind.MISS)
     assert miss.subject == "deputy1"
-    assert miss.detail == "did not answer within 2 s (/deputy1/navigation not there): no thrust"
+    assert miss.detail == "did not answer within 2 s (nobody publishes /deputy1/estimate): no thrust"
     assert executive.simulation.misses == 1
 
 
@@ -179,20 +183,21 @@ def test_the_pace_decides_when_the_next_check_is(complete: Graph) -> None:
     assert executive.simulation.plant.tick == 1
 
 
-@pytest.mark.parametrize("topic", ["/clock", "/truth", "/deputy1/measurement"])
-def test_the_run_does_not_start_while_another_publishes_its_topics(complete: Graph, topic: str) -> None:
-    complete.others = {topic: ["/rosbag2_player"]}
+@pytest.mark.parametrize("topic", ["/clock", "/truth", "/deputy1/measurement", *EVERYBODY])
+@pytest.mark.parametrize("other", ["/rosbag2_player", ""], ids=["another", "of the same name"])
+def test_the_run_does_not_start_while_another_publishes_its_topics(complete: Graph, topic: str, other: str) -> None:
+    (own,) = complete.publishers_of(topic)
+    complete.others = {topic: [other or own]}
     executive = start(complete)
-    assert complete.said == [
-        f"waiting for only one publisher of {topic}: /plant and /rosbag2_player are in this ROS domain"
-    ]
+    names = f"{own} and {other}" if other else f"{own} (2 times)"
+    assert complete.said == [f"waiting for only one publisher of {topic}: {names} are in this ROS domain"]
     assert not complete.messages
     complete.others = {}
     executive.check(0.1)
     assert complete.said[-1] == "flying"
 
 
-@pytest.mark.parametrize("topic", ["/clock", "/truth", "/deputy1/measurement", "/recorder/progress"])
+@pytest.mark.parametrize("topic", ["/clock", "/truth", "/deputy1/measurement", "/recorder/progress", *EVERYBODY])
 def test_another_publisher_in_flight_is_named_once_and_withstood(complete: Graph, topic: str) -> None:
     executive = start(complete, ticks=3)
     complete.others = {topic: ["/other"]}
@@ -201,7 +206,7 @@ def test_another_publisher_in_flight_is_named_once_and_withstood(complete: Graph
         answer(executive, now)
     (event,) = complete.events(EventKind.WARNING)
     assert topic in event.detail
-    assert "/plant and /other" in event.detail or "/other and /plant" in event.detail
+    assert "and /other" in event.detail or "/other and" in event.detail
     assert complete.reports[-1].troubles == (event.detail,)
     answer(executive, 3.0)
     assert executive.finished
@@ -209,15 +214,29 @@ def test_another_publisher_in_flight_is_named_once_and_withstood(complete: Graph
 
 def test_two_controllers_of_a_deputy_are_named(complete: Graph) -> None:
     executive = start(complete)
-    complete.others = {COMMAND.of("deputy1"): ["/deputy1/controller", "/deputy1/mine"]}
+    complete.others = {COMMAND.of("deputy1"): ["/deputy1/mine"]}
     executive.check(1.0)
     (event,) = complete.events(EventKind.WARNING)
-    assert event.detail == "/deputy1/thrust has several publishers: /deputy1/controller and /deputy1/mine"
+    assert event.detail == "/deputy1/thrust has several publishers: /deputy1/mine and /deputy1/module"
+
+
+def test_two_of_one_name_are_told_from_one_that_was_started_again(complete: Graph) -> None:
+    executive = start(complete)
+    complete.others = {"/deputy1/estimate": ["/deputy1/module"]}
+    executive.check(1.0)
+    complete.others = {}
+    executive.check(20.0)
+    assert not complete.events(EventKind.WARNING), "the killed one is forgotten"
+    complete.others = {"/deputy1/estimate": ["/deputy1/module"]}
+    for now in range(21, 60):
+        executive.check(float(now))
+    (event,) = complete.events(EventKind.WARNING)
+    assert event.detail == "/deputy1/estimate has several publishers: /deputy1/module (2 times)"
 
 
 def test_two_controllers_of_one_name_contradict_each_other(complete: Graph) -> None:
     executive = start(complete)
-    complete.others = {COMMAND.of("deputy1"): ["/deputy1/controller", "/deputy1/controller"]}
+    complete.others = {COMMAND.of("deputy1"): ["/deputy1/module"]}
     for tick in range(4):
         executive.check(float(tick))
         assert not complete.events(EventKind.WARNING), "a node that was killed is there a while longer"

@@ -10,6 +10,7 @@ from typing import Any
 import domain_coordinator
 import pytest
 import rclpy
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.context import Context
@@ -300,3 +301,30 @@ def test_a_number_of_orbits_that_cannot_be_flown_is_rejected(orbits: float) -> N
     with pytest.raises(ConfigurationError) as rejection:
         duration_of(orbits, load_scenario("leader_follower"))
     assert str(rejection.value) == f"orbits: {orbits!r} is not allowed; it must be above 0 and finite"
+
+
+def test_what_all_nodes_are_given_is_ignored_where_it_is_foreign_and_told(tmp_path: Path) -> None:
+    """As the nodes do: a file for a robot's whole bring-up has sections of its other nodes under the pattern of all."""
+    path = tmp_path / "shared.yaml"
+    document = yaml.safe_load(find_scenario("leader_follower").read_text())
+    document["/**"]["ros__parameters"] |= {"use_sim_time": True, "max_vel_x": 0.26}
+    path.write_text(yaml.safe_dump(document, sort_keys=False))
+    scenario = load_scenario(str(path))
+    assert scenario.parameters() == load_scenario("leader_follower").parameters()
+    assert scenario.ignored == ("max_vel_x",)
+
+
+@pytest.mark.parametrize("pattern", ["/plant", "/**/controller", "/deputy1/*"])
+def test_what_a_node_is_given_by_name_is_refused_where_it_is_foreign(tmp_path: Path, pattern: str) -> None:
+    path = tmp_path / "addressed.yaml"
+    own = yaml.safe_load(find_scenario("leader_follower").read_text())
+    section = own.setdefault(pattern, {"ros__parameters": {}})
+    section["ros__parameters"]["max_vel_x"] = 0.26
+    path.write_text(yaml.safe_dump(own, sort_keys=False))
+    with pytest.raises(ConfigurationError, match="max_vel_x: unknown"):
+        load_scenario(str(path))
+
+
+def test_an_override_of_all_nodes_is_meant_for_each() -> None:
+    with pytest.raises(ConfigurationError, match="max_vel_x: unknown"):
+        load_scenario("leader_follower", {"/**": {"max_vel_x": 0.26}})

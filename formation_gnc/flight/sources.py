@@ -1,0 +1,75 @@
+"""Several publishers of one topic: whose messages count, and who is named."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+
+@dataclass
+class _Stream:
+    """Messages of one publisher: the last stamp (ns) and number that were heard of it."""
+
+    stamp: int
+    number: int | None
+
+    def leads_to(self, stamp: int, number: int | None) -> bool:
+        """Whether a message is the next one."""
+        return stamp > self.stamp and (number is None or self.number is None or number == self.number + 1)
+
+
+class SourceLock:
+    """Keeps a reader to the publisher that it hears, where others publish the topic too.
+
+    A message does not carry its publisher, but each publisher numbers its own. While a topic has one publisher, every
+    message counts, as those of a new run do; while it has several, only what leads on from the last that counted,
+    and not from what others have published.
+    """
+
+    def __init__(self) -> None:
+        """No message has come."""
+        self.ignored = 0
+        """Messages that did not count."""
+        self._heard: _Stream | None = None
+        self._others: list[_Stream] = []
+
+    def accepts(self, stamp: int, number: int | None, is_shared: Callable[[], bool]) -> bool:
+        """Whether a message counts.
+
+        Args:
+            stamp: ns.
+            number: its publisher's sequence number; None where the middleware has none.
+            is_shared: whether the topic has several publishers; asked only where the numbers do not tell.
+        """
+        follows = self._heard is None or self._heard.leads_to(stamp, number)
+        others = [each for each in self._others if number is not None and each.leads_to(stamp, number)]
+        if others and (not follows or is_shared()):
+            others[0].stamp, others[0].number = stamp, number
+            self.ignored += 1
+            return False
+        if not follows and is_shared():
+            self._others.append(_Stream(stamp, number))
+            self.ignored += 1
+            return False
+        if not follows:
+            self._others.clear()
+        self._heard = _Stream(stamp, number)
+        return True
+
+
+def names_of(publishers: Sequence[str]) -> str:
+    """Full names of nodes in words, each once, with how many have it."""
+    counts = Counter(publishers)
+    return " and ".join(name if count == 1 else f"{name} ({count} times)" for name, count in sorted(counts.items()))
+
+
+def is_shared(publishers: Sequence[str]) -> bool:
+    """Whether nodes of different names publish a topic; one that is started again may be listed twice for a while."""
+    return len(set(publishers)) > 1
+
+
+def shared(topics: Sequence[str], publishers_of: Callable[[str], Sequence[str]]) -> Iterator[tuple[str, str]]:
+    """Topics that more than one node publishes, whatever their names, and those nodes in words."""
+    for topic in topics:
+        publishers = publishers_of(topic)
+        if len(publishers) > 1:
+            yield topic, names_of(publishers)
