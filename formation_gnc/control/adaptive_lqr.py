@@ -160,9 +160,7 @@ class AdaptiveLinearQuadraticRegulator(Controller[AdaptiveLqrParameters]):
         self._target = None if reason else target  # none: the observer was not updated
         return Command(estimate.mass * acceleration, fallback=reason)
 
-    def _adapt(
-        self, estimate: NavigationState, target: Target, error: Vector, thrust: tuple[Vector, Vector]
-    ) -> None:
+    def _adapt(self, estimate: NavigationState, target: Target, error: Vector, thrust: tuple[Vector, Vector]) -> None:
         """Update the networks for a scaled error, and an acceleration (3,) demanded with its limit (3,)."""
         networks, tick = self.networks, self._tick * self._rate_unit
         latitude = latitude_of(estimate.chief_state)

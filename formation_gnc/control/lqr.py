@@ -200,5 +200,7 @@ class LinearQuadraticRegulator(Controller[LqrParameters]):
         acceleration, off = self._recovery.regulate(error, limit, time / NANOSECONDS, feedback)
         force = estimate.mass * acceleration
         if self._integrates:
-            self._integral = integrated(self._integral, off[:3].tolist(), force.tolist(), self._limit.tolist(), self.tick)
+            self._integral = integrated(
+                self._integral, off[:3].tolist(), force.tolist(), self._limit.tolist(), self.tick
+            )
         return Command(force, fallback=reason)

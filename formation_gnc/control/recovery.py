@@ -132,9 +132,7 @@ class RecoveryTrajectory:
             if costate is not None:
                 self.state, self._transfer = state, _Transfer(time, duration, costate, limit)
 
-    def _costate(
-        self, state: Vector, limit: Vector, time: float, duration: float, controlled: Vector
-    ) -> Vector | None:
+    def _costate(self, state: Vector, limit: Vector, time: float, duration: float, controlled: Vector) -> Vector | None:
         """Costate (6,) at the start of the transfer in a duration (s); None if that is too short."""
         count = max(NODES, int(np.ceil(duration / self._spacing)))
         weight = duration / count

@@ -86,9 +86,9 @@ def test_the_integral_removes_the_offset_of_a_constant_disturbance(common, vehic
 def test_a_saturated_axis_does_not_wind_up(common, vehicle, estimate, target):
     parameters = dataclasses.replace(ROBERTS, integral_error=2_000.0)
     law = LinearQuadraticRegulator(parameters, common, vehicle)
-    start = [0, 0, 200, 0, 0, 0]  # far beyond the authority of 10 mN
+    start = [0, 0, 95, 0, 0, 0]  # the demand is nearly twice the limit, from where a recovery trajectory takes over
     states, forces = simulate(law, HillModel(common.mean_motion), estimate, target, start, 3000)
-    assert (np.abs(forces[:50, 2]) == 0.01).all()
+    assert (np.abs(forces[:20, 2]) == 0.01).all()
     assert np.abs(states[-1, :3]).max() < 0.1
     unlimited = dataclasses.replace(vehicle, thrust_limit=np.full(3, np.inf))  # integrates throughout
     wound = LinearQuadraticRegulator(parameters, common, unlimited)
