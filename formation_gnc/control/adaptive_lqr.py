@@ -68,8 +68,9 @@ class AdaptiveLinearQuadraticRegulator(Controller[AdaptiveLqrParameters]):
     acceleration of e: eccentricity, a wrong semi-major axis, J2, drag, and a target that is not in free motion.
     The other approximates lambda. With zero weights the law is LQR.
 
-    lambda is not trained while a thruster saturates, which is handled as by `LinearQuadraticRegulator`. If a weight diverges, LQR alone is active from then on and
-    the command gives the reason; likewise for as long as the error is beyond `MAX_ERROR`.
+    lambda is not trained while a thruster saturates, which is handled as by `LinearQuadraticRegulator`. If a weight
+    diverges, LQR alone is active from then on and the command gives the reason; likewise for as long as the error is
+    beyond `MAX_ERROR`.
 
     Assumes: a chief of small eccentricity; unmodelled accelerations that vary slowly relative to
     `identification_time`, or periodically with the argument of latitude.

@@ -13,7 +13,7 @@ SHARE = 0.8
 """Share of the thrust limit that a trajectory takes at most; the law corrects with the rest."""
 
 STRETCH = 1.4
-"""Duration over the shortest with that share: twice the time of a fuel-optimal transfer's bangs for half its delta-v."""
+"""Duration over the shortest with that share: half the delta-v of the shortest transfer at full thrust."""
 
 RATIO = 2.0**0.125
 """Ratio of successive durations that are tried."""

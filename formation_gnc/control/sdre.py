@@ -63,8 +63,8 @@ class Sdre(Controller[SdreParameters]):
     (4.13), sign corrected, in the error dynamics of a target in free motion. Without a stabilising gain, an
     LQR on Hill's equations with the same weights is active and the command gives the reason.
 
-    Saturation is handled as by `LinearQuadraticRegulator`. With `integral_error`, an axis at its thrust limit does not integrate, and a change of parameters keeps
-    the integral.
+    Saturation is handled as by `LinearQuadraticRegulator`. With `integral_error`, an axis at its thrust limit does not
+    integrate, and a change of parameters keeps the integral.
 
     Assumes: matrices that vary little within the closed loop's time constant; the model's assumptions.
     """

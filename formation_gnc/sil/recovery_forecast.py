@@ -16,7 +16,7 @@ from formation_gnc.orbit.elements import state_from_elements
 from formation_gnc.records import NavigationState, Target
 from formation_gnc.relative.chief import KeplerChief
 from formation_gnc.sil.scenario import Scenario
-from formation_gnc.types import NANOSECONDS, Vector
+from formation_gnc.types import Vector
 
 POINTS = 500
 """Least ticks per revolution of the forecast, which need not be as short as those of the flight."""
