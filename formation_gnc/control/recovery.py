@@ -136,8 +136,9 @@ class RecoveryTrajectory:
         """Costate (6,) at the start of the transfer in a duration (s); None if that is too short."""
         count = max(NODES, int(np.ceil(duration / self._spacing)))
         weight = duration / count
-        nodes = (np.arange(count) + 0.5) * weight
-        effect = np.linalg.solve(self._model.transitions(time, nodes), INPUT * limit)[:, controlled]
+        nodes = np.asarray((np.arange(count) + 0.5) * weight, dtype=np.float64)
+        inputs = np.broadcast_to(INPUT * limit, (count, 6, 3))
+        effect = np.linalg.solve(self._model.transitions(time, nodes), inputs)[:, controlled]
         rows = effect.transpose(0, 2, 1).reshape(3 * count, -1)  # of the state at the start, by unit acceleration
         unit = np.sqrt(np.sum(rows**2, axis=0) * weight)
         found = least_effort(rows * weight / unit, state[controlled] / unit, SHARE, weight)
@@ -156,10 +157,10 @@ class RecoveryTrajectory:
             self.state = self._transfer = None
             return NO_THRUST
         phi, gamma = self._step or self._middle_step(transfer.time)
-        transfer.costate = np.linalg.solve(phi.T, transfer.costate)
+        transfer.costate = np.asarray(np.linalg.solve(phi.T, transfer.costate), dtype=np.float64)
         demand = transfer.limit * (transfer.costate @ gamma) / self._tick
         acceleration: Vector = transfer.limit * np.clip(demand, -SHARE, SHARE)
-        self._following = phi @ self.state + gamma @ acceleration
+        self._following = np.asarray(phi @ self.state + gamma @ acceleration, dtype=np.float64)
         return acceleration
 
     def _middle_step(self, time: float) -> tuple[Matrix, Matrix]:
