@@ -79,6 +79,8 @@ class RecoveryTrajectory:
         self._step: tuple[Matrix, Matrix] | None = model.discretise(0.0, tick) if model.is_time_invariant else None
         self._transfer: _Transfer | None = None
         self._following: Vector = np.zeros(6)
+        self._pause = 0
+        """Ticks until an error out of reach is tried again."""
         self.planned: Vector = NO_THRUST
         """(3,) acceleration of the trajectory in the tick that was regulated last, m/s^2."""
         self.has_begun = False
@@ -114,12 +116,13 @@ class RecoveryTrajectory:
     def begin(self, error: Vector, limit: Vector, time: float) -> None:
         """Start at an error (6,), for a limit (3,), m/s^2, of the acceleration, at a time (s) of the model.
 
-        Without cross-track thruster that motion is left out. No trajectory starts at an error out of reach.
+        Without cross-track thruster that motion is left out. No trajectory starts at an error out of reach, nor soon
+        after one.
         """
         self.state, self._transfer, self.planned = None, None, NO_THRUST
         controlled = np.tile([True, True, bool(limit[2] > 0.0)], 2)
         state = np.where(controlled, error, 0.0)
-        if not (np.isfinite(state).all() and limit[1] > 0.0):
+        if self._pause > 0 or not (np.isfinite(state).all() and limit[1] > 0.0):
             return
         low, high = 0, len(self._durations)
         while low < high:
@@ -131,6 +134,8 @@ class RecoveryTrajectory:
             costate = self._costate(state, limit, time, duration, controlled)
             if costate is not None:
                 self.state, self._transfer = state, _Transfer(time, duration, costate, limit)
+                return
+        self._pause = round(self._model.period / NODES / self._tick)
 
     def _costate(self, state: Vector, limit: Vector, time: float, duration: float, controlled: Vector) -> Vector | None:
         """Costate (6,) at the start of the transfer in a duration (s); None if that is too short."""
@@ -171,6 +176,7 @@ class RecoveryTrajectory:
 
     def advance(self) -> None:
         """Move on by a tick under the last acceleration."""
+        self._pause -= self._pause > 0
         if self._transfer is not None and self.state is not None:
             self.state = self._following
             self._transfer.time += self._tick

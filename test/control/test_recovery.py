@@ -64,6 +64,17 @@ def test_about_an_ellipse_the_trajectory_is_that_of_its_model():
     assert np.linalg.norm(states[-1, :3]) < 20.0
 
 
+def test_an_error_out_of_reach_is_not_tried_again_at_every_tick():
+    trajectory, tried = RecoveryTrajectory(HILL, TICK), []
+    find = trajectory._costate
+    trajectory._costate = lambda *a: tried.append(a) or find(*a)
+    for _ in range(18):  # a 32nd of a revolution
+        trajectory.begin(np.array([1e7, 0.0, 0.0, 0.0, 0.0, 0.0]), np.full(3, 1e-7), 0.0)
+        assert trajectory.state is None
+        trajectory.advance()
+    assert len(tried) <= 8  # one bisection
+
+
 def test_what_the_inputs_cannot_cancel_has_no_costate():
     rows = np.eye(2)
     np.testing.assert_allclose(least_effort(rows, np.array([0.5, -0.9]), 1.0, 1.0), [-0.5, 0.9], atol=1e-6)
