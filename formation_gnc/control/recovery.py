@@ -33,6 +33,9 @@ COARSENESS = 6.0
 OVERASKED = 2.0
 """Demand over the limit beyond which a regulator is not clipped: it is stable with half its gain, not with less."""
 
+RETRIES = 8
+"""Trials per revolution for an error out of reach."""
+
 ITERATIONS = 30
 """Newton iterations for a costate beyond which a duration counts as too short; five to fifteen suffice."""
 
@@ -135,7 +138,7 @@ class RecoveryTrajectory:
             if costate is not None:
                 self.state, self._transfer = state, _Transfer(time, duration, costate, limit)
                 return
-        self._pause = round(self._model.period / NODES / self._tick)
+        self._pause = round(self._model.period / RETRIES / self._tick)
 
     def _costate(self, state: Vector, limit: Vector, time: float, duration: float, controlled: Vector) -> Vector | None:
         """Costate (6,) at the start of the transfer in a duration (s); None if that is too short."""

@@ -68,7 +68,7 @@ def test_an_error_out_of_reach_is_not_tried_again_at_every_tick():
     trajectory, tried = RecoveryTrajectory(HILL, TICK), []
     find = trajectory._costate
     trajectory._costate = lambda *a: tried.append(a) or find(*a)
-    for _ in range(18):  # a 32nd of a revolution
+    for _ in range(70):  # an eighth of a revolution
         trajectory.begin(np.array([1e7, 0.0, 0.0, 0.0, 0.0, 0.0]), np.full(3, 1e-7), 0.0)
         assert trajectory.state is None
         trajectory.advance()
