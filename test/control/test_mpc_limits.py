@@ -20,8 +20,8 @@ def limits(draw):
     size = 10.0 ** draw(st.floats(-3.0, -1.0))
     eclipses, begin = [], 0.0
     for _ in range(draw(st.integers(0, 2))):
-        begin += draw(st.floats(0.0, 1500.0))
-        eclipses.append((begin, begin := begin + draw(st.floats(5.0, 2000.0))))
+        begin += float(draw(st.integers(0, 1500)))
+        eclipses.append((begin, begin := begin + float(draw(st.integers(5, 2000)))))
     parameters = MpcParameters(
         step=draw(st.sampled_from([20.0, 60.0])),
         horizon=110,
