@@ -8,7 +8,9 @@ import numpy as np
 
 from formation_gnc.common import CommonParameters
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
+from formation_gnc.control.models import transfer_model
 from formation_gnc.control.networks import Networks, Regulator, basis_functions
+from formation_gnc.control.recovery import RecoveryTrajectory
 from formation_gnc.control.riccati import Weights, continuous_cost_to_go
 from formation_gnc.control.target_prediction import has_jumped
 from formation_gnc.control.weights import QuadraticWeights
@@ -66,8 +68,9 @@ class AdaptiveLinearQuadraticRegulator(Controller[AdaptiveLqrParameters]):
     acceleration of e: eccentricity, a wrong semi-major axis, J2, drag, and a target that is not in free motion.
     The other approximates lambda. With zero weights the law is LQR.
 
-    lambda is not trained while a thruster saturates. If a weight diverges, LQR alone is active from then on and
-    the command gives the reason; likewise for as long as the error is beyond `MAX_ERROR`.
+    lambda is not trained while a thruster saturates, which is handled as by `LinearQuadraticRegulator`. If a weight
+    diverges, LQR alone is active from then on and the command gives the reason; likewise for as long as the error is
+    beyond `MAX_ERROR`.
 
     Assumes: a chief of small eccentricity; unmodelled accelerations that vary slowly relative to
     `identification_time`, or periodically with the argument of latitude.
@@ -94,6 +97,8 @@ class AdaptiveLinearQuadraticRegulator(Controller[AdaptiveLqrParameters]):
             )
         model, orbit = HillModel(common.mean_motion), common.chief
         self._tick = common.tick
+        self._transfer_model = transfer_model(common)
+        self._recovery = RecoveryTrajectory(self._transfer_model, common.tick)
         self._limit, self._mass = vehicle.thrust_limit, vehicle.mass
         self._mean_motion, self._latitude = model.mean_motion, orbit.argument_of_perigee + orbit.true_anomaly
         self._radius = orbit.semi_major_axis / parameters.reach
@@ -136,35 +141,39 @@ class AdaptiveLinearQuadraticRegulator(Controller[AdaptiveLqrParameters]):
 
     def command(self, estimate: NavigationState, target: Target) -> Command:
         """The force of the regulator with the networks, which are updated at every tick."""
-        offset = estimate.relative_state - target.relative_state
-        error, reason = offset / self._state_unit, self._failure
+        offset, limit = estimate.relative_state - target.relative_state, self._limit / estimate.mass
+        reason, none = self._failure, np.zeros(6)
         if not np.abs(offset).max() < MAX_ERROR:
             reason = reason or "adaptive_lqr: error out of range; LQR active"
-        elif not reason:
-            thrust = self._adapt(estimate, target, error)
-            largest = self.networks.largest_weight
-            if not (largest <= MAX_WEIGHT and np.isfinite(thrust).all()):
-                reason = f"adaptive_lqr: network weights have diverged to {largest:.3g}; LQR active"
-                self._failure = reason
-        if reason:
-            thrust = self._regulator.thrust(error, np.zeros(6))
-        self._target = None if reason else target  # none: the observer was not updated
-        return Command(estimate.mass * self._input_unit * thrust, fallback=reason)
 
-    def _adapt(self, estimate: NavigationState, target: Target, error: Vector) -> Vector:
-        """Scaled thrust (3,), after an update of the networks."""
+        def feedback(off: Vector) -> Vector:
+            error = off / self._state_unit
+            return self._input_unit * (self._regulator.thrust(error, none) if reason else self.networks.thrust(error))
+
+        time = self._transfer_model.time_at(estimate.chief_state, estimate.time / NANOSECONDS)
+        acceleration, off = self._recovery.regulate(offset, limit, time, feedback)
+        if not reason:
+            self._adapt(estimate, target, off / self._state_unit, (acceleration, limit))
+            largest = self.networks.largest_weight
+            if not (largest <= MAX_WEIGHT and np.isfinite(acceleration).all()):
+                reason = f"adaptive_lqr: network weights have diverged to {largest:.3g}; LQR active"
+                self._failure, acceleration = reason, feedback(offset)
+        self._target = None if reason else target  # none: the observer was not updated
+        return Command(estimate.mass * acceleration, fallback=reason)
+
+    def _adapt(self, estimate: NavigationState, target: Target, error: Vector, thrust: tuple[Vector, Vector]) -> None:
+        """Update the networks for a scaled error, and an acceleration (3,) demanded with its limit (3,)."""
         networks, tick = self.networks, self._tick * self._rate_unit
         latitude = latitude_of(estimate.chief_state)
         if latitude is None:
             latitude = self._latitude + self._mean_motion * estimate.time / NANOSECONDS
         basis, gradients = basis_functions(estimate.relative_state / self._state_unit, self._radius, latitude)
-        if self._target is None or has_jumped(self._target, target):
+        if self._target is None or self._recovery.has_begun or has_jumped(self._target, target):
             networks.reset_observer(error)
         networks.identify(error, basis, gradients, tick)
-        wanted = networks.thrust(error)
-        limit = self._limit / (estimate.mass * self._input_unit)
+        wanted, limit = thrust
         applied = np.clip(wanted, -limit, limit)
-        following = networks.predict(error, basis, applied, tick)
+        own = (applied - self._recovery.planned) / self._input_unit
+        following = networks.predict(error, basis, own, tick)
         if (applied == wanted)[self._limit > 0.0].all():
             networks.train(error, following, gradients, tick)
-        return wanted

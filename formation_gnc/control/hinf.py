@@ -1,6 +1,5 @@
 """H-infinity control by mixed-sensitivity synthesis."""
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,9 +17,6 @@ from formation_gnc.errors import DesignError
 from formation_gnc.parameters import parameter
 from formation_gnc.records import NavigationState, Target
 from formation_gnc.types import Matrix, Vector
-
-RECOVERY_BANDWIDTH = 4.0
-"""Bandwidth of the fastest recovery from saturation over the required bandwidth."""
 
 ROUNDING = 1.0 + 1e-9
 """Share of the limit above which a force saturates: one handed over at the limit does not."""
@@ -148,6 +144,8 @@ class HInfinityController(Controller[HinfParameters]):
             parameters.disturbance,
         )
         self._limit, self._mass = vehicle.thrust_limit, vehicle.mass
+        self.recovery = RecoveryTrajectory(model, common.tick)
+        """The recovery from saturation in progress."""
         self._force = np.zeros(3)
         self._states: Vector | None = None
         try:
@@ -157,9 +155,6 @@ class HInfinityController(Controller[HinfParameters]):
             self.sampled = self.continuous.discretised(common.tick)
             phi, gamma = model.discretise(0.0, common.tick)
             self._design_activation(phi, gamma)
-            fastest = RECOVERY_BANDWIDTH * max(parameters.bandwidth)
-            self.recovery = RecoveryTrajectory(phi, gamma, common.tick, math.tau / model.period, fastest)
-            """The recovery from saturation in progress."""
         except DesignError as error:
             raise DesignError(f"hinf: {error}") from error
 
@@ -228,14 +223,14 @@ class HInfinityController(Controller[HinfParameters]):
         """Output of the controller, whose states advance by a tick, plus the recovery's acceleration."""
         error = estimate.relative_state - target.relative_state
         limit, size = self._limit / estimate.mass, self.sampled.b.shape[1]
-        recovery = self.recovery.acceleration(limit)
+        recovery = self.recovery.acceleration()
         off = error if self.recovery.state is None else error - self.recovery.state
         if self._states is None:
             self._states = self._states_for(off, self._force / estimate.mass - recovery)
         acceleration = recovery + self.sampled.c @ self._states + self.sampled.d @ off[:size]
         if (np.abs(acceleration) > ROUNDING * limit)[limit > 0.0].any():
-            self.recovery.begin(error)
-            acceleration = self.recovery.acceleration(limit)
+            self.recovery.begin(error, limit, 0.0)
+            acceleration = self.recovery.acceleration()
             off, self._states = np.zeros(6), np.zeros_like(self._states)
         states = self.sampled.a @ self._states + self.sampled.b @ off[:size]
         # Reinitialise after an overflow.

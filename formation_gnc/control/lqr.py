@@ -12,6 +12,7 @@ from formation_gnc.control.feed_forward import FeedForward
 from formation_gnc.control.integral import IntegralWeights, integrated, with_integral
 from formation_gnc.control.linear import LinearController
 from formation_gnc.control.models import DESIGN_MODELS
+from formation_gnc.control.recovery import RecoveryTrajectory
 from formation_gnc.control.riccati import (
     Weights,
     continuous_gain,
@@ -23,7 +24,7 @@ from formation_gnc.errors import DesignError
 from formation_gnc.parameters import parameter
 from formation_gnc.records import NavigationState, Target
 from formation_gnc.relative.model import RelativeModel
-from formation_gnc.types import NANOSECONDS, Matrix
+from formation_gnc.types import NANOSECONDS, Matrix, Vector
 
 ORBIT_INTERVALS = 180
 """Intervals of an orbit (2 degrees each) over which the design holds a time-varying model constant."""
@@ -72,6 +73,9 @@ class LinearQuadraticRegulator(Controller[LqrParameters]):
     tick. A gain that varies along the orbit is tabulated in the design and interpolated in flight, at the phase of
     the estimated chief.
 
+    Where the demand is beyond what clipping leaves stable, the law acts about a trajectory to the target that the
+    thrusters can fly (`RecoveryTrajectory`), from any error.
+
     With `integral_error`, the state is augmented by the integral of the position error: an axis at its thrust
     limit does not integrate, and a change of parameters keeps the integral.
 
@@ -89,7 +93,8 @@ class LinearQuadraticRegulator(Controller[LqrParameters]):
         """
         model = self._model = DESIGN_MODELS[parameters.model](common)
         self.tick = common.tick
-        self._limit, self._mass = vehicle.thrust_limit.tolist(), vehicle.mass
+        self._limit, self._mass = vehicle.thrust_limit, vehicle.mass
+        self._recovery = RecoveryTrajectory(model, common.tick)
         self._integrates = parameters.integrates
         self._feed_forward = FeedForward(parameters.feed_forward, model)
         self._integral = [0.0, 0.0, 0.0] if self._integrates else []
@@ -180,15 +185,22 @@ class LinearQuadraticRegulator(Controller[LqrParameters]):
         """Feedback on the estimated error, plus feed-forward."""
         if self._start is None:
             self._start = estimate.time
-        error: list[float] = (estimate.relative_state - target.relative_state).tolist()
+        error = estimate.relative_state - target.relative_state
         feed_forward, reason = self._feed_forward(estimate, target)
         time = estimate.time
         if len(self.gains) and not self._finite:
             time = round(self._model.time_at(estimate.chief_state, time / NANOSECONDS) * NANOSECONDS)
-        force = [
-            estimate.mass * (acceleration - sumprod(row, error + self._integral))
-            for row, acceleration in zip(self.gain_at(time).tolist(), feed_forward.tolist(), strict=True)
-        ]
+        rows, free = self.gain_at(time).tolist(), feed_forward.tolist()
+
+        def feedback(off: Vector) -> Vector:
+            state = off.tolist() + self._integral
+            return np.array([push - sumprod(row, state) for row, push in zip(rows, free, strict=True)])
+
+        limit = self._limit / estimate.mass
+        acceleration, off = self._recovery.regulate(error, limit, time / NANOSECONDS, feedback)
+        force = estimate.mass * acceleration
         if self._integrates:
-            self._integral = integrated(self._integral, error[:3], force, self._limit, self.tick)
-        return Command(np.array(force), fallback=reason)
+            self._integral = integrated(
+                self._integral, off[:3].tolist(), force.tolist(), self._limit.tolist(), self.tick
+            )
+        return Command(force, fallback=reason)

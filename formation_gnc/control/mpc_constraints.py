@@ -111,7 +111,8 @@ class ThrustBox(Constraint):
         """(steps, 3) largest force from which the ticks until the next eclipse lead to zero."""
         steps, eclipses = np.arange(self._steps)[:, None], inputs.target.eclipses
         begin = inputs.estimate.time + self._step * steps
-        ticks = np.where(eclipses[:, 1] > begin, (eclipses[:, 0] - begin) // self._tick, np.inf).min(axis=1)
+        ticks = np.where(eclipses[:, 1] > begin, (eclipses[:, 0] - begin) // self._tick, np.inf)
+        ticks = ticks.min(axis=1, initial=np.inf)
         change = rate.change / rate.unit
         in_time = change * np.maximum(ticks, 0.0)[:, None]
         fastest = np.abs(rate.previous) / rate.unit - change * (1.0 + self._step // self._tick * steps)

@@ -43,7 +43,7 @@ SETTINGS = {
     "eps_abs": ACCURACY,
     "eps_rel": ACCURACY,
     "max_iter": MAX_ITERATIONS,
-    "check_termination": 10,
+    "check_termination": 5,
     "adaptive_rho": 1,  # by iterations, not by a clock
     "adaptive_rho_interval": 50,
     "polishing": False,
@@ -166,7 +166,9 @@ class PlanSolver:
             self._free = free = lower < upper
             self._factor = cho_factor(self._hessian[np.ix_(free, free)], lower=True, check_finite=False)[0]
         point = np.zeros(len(gradient))
-        if self._free.any():  # LAPACK rejects an empty system
+        if len(self._factor) == len(gradient):
+            point = -dpotrs(self._factor, gradient, lower=1)[0]
+        elif len(self._factor):  # LAPACK rejects an empty system
             point[: self.count][self._free] = -dpotrs(self._factor, gradient[: self.count][self._free], lower=1)[0]
         forces = point[: self.count]
         if (forces > upper).any() or (forces < lower).any() or programme.violation(point) > 0.0:
@@ -220,17 +222,17 @@ class PlanSolver:
     ) -> Solution | None:
         """The forces within the thrust box and their cost; None if it is not within `OPTIMALITY` of the optimum."""
         count = self.count
-        exact = np.zeros(len(point))
-        exact[:count] = np.minimum(np.maximum(point[:count], programme.lower[:count]), programme.upper[:count])
-        if len(exact) > count:
+        exact = np.minimum(np.maximum(point[:count], programme.lower[:count]), programme.upper[:count])
+        if len(point) > count:
+            exact = np.concatenate([exact, np.zeros(len(point) - count)])
             row, column, sign = self._slack_elements
             values = (programme.rows @ exact)[row]
             short = np.where(sign > 0.0, programme.lower[row] - values, values - programme.upper[row])
             np.maximum.at(exact, column, short)
-        cost = programme.cost(exact)
         if programme.violation(exact) > FEASIBILITY:
             return None
-        if not cost - programme.least_cost(exact[:count], multipliers) <= OPTIMALITY * cost + LEAST_COST:
+        cost, least = programme.bracket(exact, multipliers)
+        if not cost - least <= OPTIMALITY * cost + LEAST_COST:
             return None
         return Solution(exact[:count].reshape(-1, 3), "solved", iterations, cost)
 

@@ -33,6 +33,11 @@ class QuadraticProgramme:
     offset: float
     """Cost of zero force, with which the cost of every plan is positive."""
 
+    @property
+    def is_box(self) -> bool:
+        """Whether the thrust box is all that bounds the forces, with no slack."""
+        return len(self.lower) == len(self.linear) == len(self.hessian)
+
     def curve(self, point: Vector) -> Vector:
         """P x (F + S,) at a point x (F + S,)."""
         count = len(self.hessian)
@@ -52,24 +57,30 @@ class QuadraticProgramme:
         values = (self.rows @ point)[count:]
         return float(max((self.lower[count:] - values).max(), (values - self.upper[count:]).max(), 0.0))
 
-    def least_cost(self, forces: Vector, multipliers: Vector) -> float:
-        """Lower bound on the cost of any plan, with the offset: the dual cost, tight at the solution.
+    def bracket(self, point: Vector, multipliers: Vector) -> tuple[float, float]:
+        """Cost of a point (F + S,), and a lower bound on that of any plan: the dual cost, tight at the solution.
 
-        For any y, and x the forces: P is convex and y' A z at most its support over l and u, so that the cost of z
-        is at least q' z + x' P z - x' P x / 2 + y' A z - support(y). The least of it over the thrust box, and over
-        slacks of any size where they have a quadratic cost, else of a size that a force has.
+        Both with the offset. For any y, and x the forces: P is convex and y' A z at most its support over l and u, so
+        that the cost of z is at least q' z + x' P z - x' P x / 2 + y' A z - support(y). The least of it over the thrust
+        box, and over slacks of any size where they have a quadratic cost, else of a size that a force has.
         """
-        count = len(self.hessian)
-        valid = np.where(multipliers > 0.0, np.isfinite(self.upper), np.isfinite(self.lower))
-        multipliers = np.where(valid, multipliers, 0.0)
-        bound = np.where(multipliers > 0.0, self.upper, self.lower)
-        support = float(multipliers[valid] @ bound[valid])
-        push = self.columns @ multipliers + self.linear
-        curve = self.hessian @ forces
+        count, curve = len(self.hessian), self.curve(point)
+        cost = float(point @ (0.5 * curve + self.linear)) + self.offset
+        above, below = np.maximum(multipliers, 0.0), np.minimum(multipliers, 0.0)
+        if self.is_box:
+            push = multipliers + self.linear
+            support = float(above @ self.upper + below @ self.lower)
+        else:
+            # No bound, no multiplier.
+            bounded = np.isfinite(self.upper), np.isfinite(self.lower)
+            above, below = np.where(bounded[0], above, 0.0), np.where(bounded[1], below, 0.0)
+            support = float(above[bounded[0]] @ self.upper[bounded[0]] + below[bounded[1]] @ self.lower[bounded[1]])
+            push = self.columns @ (above + below) + self.linear
+        forces, own = point[:count], curve[:count]
         box = np.maximum(-self.lower[:count], self.upper[:count])
-        least = self.offset - support - 0.5 * float(forces @ curve) - float(box @ np.abs(push[:count] + curve))
+        least = self.offset - support - 0.5 * float(forces @ own) - float(box @ np.abs(push[:count] + own))
         if len(self.slack_hessian):
             slacks, squares = push[count:], self.slack_hessian > 0.0
             least -= 0.5 * float(np.sum(slacks[squares] ** 2 / self.slack_hessian[squares]))
             least -= float(box.max() * np.abs(slacks[~squares]).sum())
-        return least
+        return cost, least

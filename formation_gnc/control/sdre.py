@@ -11,7 +11,8 @@ from formation_gnc.control.feed_forward import FeedForward
 from formation_gnc.control.fixed_endpoint_lq import discretise, state_dependent
 from formation_gnc.control.integral import IntegralWeights, integrated, with_integral
 from formation_gnc.control.lqr import LinearQuadraticRegulator, LqrParameters
-from formation_gnc.control.models import PLAN_MODELS
+from formation_gnc.control.models import PLAN_MODELS, transfer_model
+from formation_gnc.control.recovery import RecoveryTrajectory
 from formation_gnc.control.riccati import Weights, stationary_gain
 from formation_gnc.errors import ConfigurationError, DesignError
 from formation_gnc.orbit.elements import Elements, elements_from_state
@@ -62,8 +63,8 @@ class Sdre(Controller[SdreParameters]):
     (4.13), sign corrected, in the error dynamics of a target in free motion. Without a stabilising gain, an
     LQR on Hill's equations with the same weights is active and the command gives the reason.
 
-    With `integral_error`, an axis at its thrust limit does not integrate, and a change of parameters keeps
-    the integral.
+    Saturation is handled as by `LinearQuadraticRegulator`. With `integral_error`, an axis at its thrust limit does not
+    integrate, and a change of parameters keeps the integral.
 
     Assumes: matrices that vary little within the closed loop's time constant; the model's assumptions.
     """
@@ -77,7 +78,9 @@ class Sdre(Controller[SdreParameters]):
             DesignError: inadmissible weights.
         """
         self._parameters = parameters
-        self._tick, self._limit, self._mass = common.tick, vehicle.thrust_limit.tolist(), vehicle.mass
+        self._tick, self._limit, self._mass = common.tick, vehicle.thrust_limit, vehicle.mass
+        self._transfer_model = transfer_model(common)
+        self._recovery = RecoveryTrajectory(self._transfer_model, common.tick)
         self._chief = common.chief
         self._integrates = parameters.integrates
         self._integral = [0.0, 0.0, 0.0] if self._integrates else []
@@ -144,9 +147,17 @@ class Sdre(Controller[SdreParameters]):
         except (ConfigurationError, ArithmeticError) as reason:
             force = self.fallback_law.command(estimate, target).force
             return Command(force, fallback=f"no gain: {reason}; LQR active")
-        acceleration: Vector = -gain[:, :6] @ error - gain[:, 6:] @ np.array(self._integral)
         feed_forward, unavailable = self._feed_forward(estimate, target)
-        force = estimate.mass * (acceleration + ((at_goal - at_state) @ goal)[3:] + feed_forward)
+        integral, remainder = gain[:, 6:] @ np.array(self._integral), ((at_goal - at_state) @ goal)[3:]
+
+        def feedback(off: Vector) -> Vector:
+            acceleration: Vector = -gain[:, :6] @ off - integral + remainder + feed_forward
+            return acceleration
+
+        time = self._transfer_model.time_at(estimate.chief_state, estimate.time / NANOSECONDS)
+        acceleration, off = self._recovery.regulate(error, self._limit / estimate.mass, time, feedback)
+        force = estimate.mass * acceleration
         if self._integrates:
-            self._integral = integrated(self._integral, error[:3].tolist(), force.tolist(), self._limit, self._tick)
+            limit = self._limit.tolist()
+            self._integral = integrated(self._integral, off[:3].tolist(), force.tolist(), limit, self._tick)
         return Command(force, fallback=unavailable)

@@ -84,17 +84,19 @@ def test_the_integral_removes_the_offset_of_a_constant_disturbance(common, vehic
 
 
 @pytest.mark.thorough
-def test_a_saturated_axis_does_not_wind_up(common, vehicle, estimate, target):
+@pytest.mark.parametrize(("start", "share"), [(22.0, 0.95), (200.0, 0.5)])
+def test_a_saturated_axis_does_not_wind_up(start, share, common, vehicle, estimate, target):
+    """10 mN hold 12 m: clipped up to twice that, beyond it on a recovery trajectory."""
     parameters = dataclasses.replace(ROBERTS, integral_error=2_000.0)
-    law = LinearQuadraticRegulator(parameters, common, vehicle)
-    start = [0, 0, 200, 0, 0, 0]  # far beyond the authority of 10 mN
-    states, forces = simulate(law, HillModel(common.mean_motion), estimate, target, start, 3000)
-    assert (np.abs(forces[:50, 2]) == 0.01).all()
+    law, model = LinearQuadraticRegulator(parameters, common, vehicle), HillModel(common.mean_motion)
+    away = [0.0, 0.0, start, 0.0, 0.0, 0.0]
+    states, forces = simulate(law, model, estimate, target, away, 3000)
+    assert start > 100.0 or (np.abs(forces[:10, 2]) == 0.01).all()
     assert np.abs(states[-1, :3]).max() < 0.1
     unlimited = dataclasses.replace(vehicle, thrust_limit=np.full(3, np.inf))  # integrates throughout
     wound = LinearQuadraticRegulator(parameters, common, unlimited)
-    others, _ = simulate(wound, HillModel(common.mean_motion), estimate, target, start, 3000)
-    assert np.sum(np.abs(states[:, 2])) < 0.8 * np.sum(np.abs(others[:, 2]))
+    others, _ = simulate(wound, model, estimate, target, away, 3000)
+    assert np.sum(np.abs(states[:, 2])) < share * np.sum(np.abs(others[:, 2]))
 
 
 def test_new_parameters_keep_the_integral(common, vehicle, estimate, target):
