@@ -80,9 +80,12 @@ def initial_errors(scenario: Scenario) -> dict[str, Vector]:
 def forecast(parameters: ControllerParameters, error: Vector, duration: float) -> Forecast:
     """Fly the law from an error (6,) to a target at the chief, on the linear model, for at most a duration (s).
 
+    Without its dead band, in which an error is to stay.
+
     Raises:
         ConfigurationError: the parameters admit no law.
     """
+    parameters = replace(parameters, dead_band=(0.0,) * len(parameters.dead_band))
     try:
         coarse = replace(parameters, tick=_tick(parameters))
         manager = ControllerManager("/forecast", coarse)
