@@ -131,6 +131,7 @@ class AdaptiveLinearQuadraticRegulator(Controller[AdaptiveLqrParameters]):
 
     def activate(self, handover: Handover) -> None:
         """Take over the weights of a previous law with the same units."""
+        self._recovery.end()
         before = handover.law
         if (
             isinstance(before, AdaptiveLinearQuadraticRegulator)

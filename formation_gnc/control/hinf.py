@@ -217,7 +217,8 @@ class HInfinityController(Controller[HinfParameters]):
 
     def activate(self, handover: Handover) -> None:
         """Start from the force commanded before."""
-        self._force, self._states, self.recovery.state = handover.force, None, None
+        self._force, self._states = handover.force, None
+        self.recovery.end()
 
     def command(self, estimate: NavigationState, target: Target) -> Command:
         """Output of the controller, whose states advance by a tick, plus the recovery's acceleration."""

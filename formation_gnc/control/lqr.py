@@ -178,6 +178,7 @@ class LinearQuadraticRegulator(Controller[LqrParameters]):
 
     def activate(self, handover: Handover) -> None:
         """Take over the integral of a previous LQR."""
+        self._recovery.end()
         if self._integrates and isinstance(handover.law, LinearQuadraticRegulator):
             self._integral = handover.law._integral or self._integral
 

@@ -156,6 +156,10 @@ class RecoveryTrajectory:
         costate[controlled] = found / unit
         return costate
 
+    def end(self) -> None:
+        """Drop the trajectory, as after ticks that were not regulated."""
+        self.state, self._transfer, self._pause = None, None, 0
+
     def acceleration(self) -> Vector:
         """(3,) acceleration for this tick, m/s^2; zero without a trajectory, and at its end."""
         transfer = self._transfer

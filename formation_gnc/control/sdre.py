@@ -103,6 +103,7 @@ class Sdre(Controller[SdreParameters]):
 
     def activate(self, handover: Handover) -> None:
         """Take over the integral of a previous SDRE law."""
+        self._recovery.end()
         if self._integrates and isinstance(handover.law, Sdre):
             self._integral = handover.law._integral or self._integral
 

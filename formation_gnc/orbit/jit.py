@@ -25,6 +25,7 @@ ANY_MATRIX = numba.types.Array(numba.float64, 2, "A", readonly=True)
 SOURCES = {
     "orbit": ("orbit",),
     "relative": ("orbit", "relative"),
+    "guidance": ("orbit", "guidance"),
     "sensors": ("orbit", "sensors"),
     "navigation/kernels": ("orbit", "sensors", "navigation/kernels"),
 }

@@ -14,6 +14,7 @@ from formation_gnc.recording.files import COMPRESSED, bag_files, missing_files, 
 from formation_gnc.recording.mcap_file import verified_summary
 from formation_gnc.recording.salvage import Group, SalvageReader
 from formation_gnc.recording.sqlite_salvage import SqliteSalvage
+from formation_gnc.recording.stored_file import Series, type_of
 from formation_gnc.recording.topic_definition import TopicDefinition
 from formation_gnc.recording.writer import BagWriter
 
@@ -51,7 +52,8 @@ def recover(path: Path, output: Path) -> Recovery:
     Raises:
         BagError: the bag does not exist, or the output does.
     """
-    surveys = [_surveyed(file) for file in bag_files(path)]
+    unpack = unpacker(path) or bytes
+    surveys = [_surveyed(file, unpack) for file in bag_files(path)]
     reasons = tuple(reason for survey in surveys for reason in survey.reasons) + tuple(missing_files(path))
     saved = sum(survey.saved.total() for survey in surveys)
     lost: Counter[str] = Counter()
@@ -63,9 +65,7 @@ def recover(path: Path, output: Path) -> Recovery:
         return Recovery(WHOLE, None, saved, {}, ())
     reasons += tuple(_leave_out_other_types(surveys, lost))
     saved = sum(survey.saved.total() for survey in surveys)
-    _write(
-        surveys, output, {"source": str(path), "lost": str(dict(lost)), "reasons": "\n".join(reasons)}, unpacker(path)
-    )
+    _write(surveys, output, {"source": str(path), "lost": str(dict(lost)), "reasons": "\n".join(reasons)})
     return Recovery(PARTLY_LOST if reasons else WHOLE, output, saved, dict(lost), reasons)
 
 
@@ -74,6 +74,7 @@ class _Survey:
     """What is readable of a file."""
 
     path: Path
+    unpack: Unpack
     indexed: bool = False
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
@@ -93,6 +94,22 @@ class _Survey:
             elif isinstance(record, Channel):
                 self.channels.setdefault(record.id, record)
 
+    def readable(self, group: Group) -> list[Message | Schema | Channel]:
+        """Records of a group, without messages that do not fit their type: not every damage has a checksum."""
+        return [record for record in group.records if not isinstance(record, Message) or self._fits(record)]
+
+    def _fits(self, message: Message) -> bool:
+        channel = self.channels.get(message.channel_id)
+        if channel is None:
+            return True
+        schema = self.schemas.get(channel.schema_id)
+        name, text, encoding = (schema.name, schema.data, schema.encoding) if schema else ("", b"", "")
+        try:
+            kind = type_of(Series(channel.topic, name, text, encoding, channel.message_encoding))
+        except BagError:  # nothing is known about it
+            return True
+        return kind.fits(self.unpack(message.data))
+
     def count(self, found: Counter[int], missing: Counter[int]) -> None:
         """Count as saved or lost what was found or is missing, by channel."""
         for channel_id, count in (+missing).items():
@@ -111,9 +128,9 @@ def _reader(path: Path, stream: BinaryIO) -> SalvageReader | SqliteSalvage:
     return SqliteSalvage(path) if path.suffix == ".db3" else SalvageReader(stream)
 
 
-def _surveyed(path: Path) -> _Survey:
+def _surveyed(path: Path, unpack: Unpack) -> _Survey:
     """Read a file once, without keeping its messages."""
-    survey = _Survey(path)
+    survey = _Survey(path, unpack)
     found: Counter[int] = Counter()
     missing: Counter[int] = Counter()
     from_damaged: Counter[int] | None = None  # messages found in the chunk before, if that is damaged
@@ -127,10 +144,11 @@ def _surveyed(path: Path) -> _Survey:
         for record in reader.records():
             match record:
                 case Group():
-                    counts = Counter(item.channel_id for item in record.records if isinstance(item, Message))
+                    survey.add_definitions(record)
+                    readable = survey.readable(record)
+                    counts = Counter(item.channel_id for item in readable if isinstance(item, Message))
                     found.update(counts)
                     from_damaged = counts if record.damaged else None
-                    survey.add_definitions(record)
                 case MessageIndex() if from_damaged is not None:
                     missing[record.channel_id] += len(record.records) - from_damaged[record.channel_id]
                 case Metadata():
@@ -164,7 +182,7 @@ def _leave_out_other_types(surveys: list[_Survey], lost: Counter[str]) -> Iterat
                 yield f"{survey.path}: topic {channel.topic} has messages of a second type, {kind[0] or 'unknown'}"
 
 
-def _write(surveys: list[_Survey], output: Path, report: dict[str, str], unpack: Unpack | None) -> None:
+def _write(surveys: list[_Survey], output: Path, report: dict[str, str]) -> None:
     """Write everything readable into a new bag, whose messages are plain."""
     metadata = {name: values for survey in surveys for name, values in survey.metadata.items()}
     metadata.pop("rosbag2", None)
@@ -177,13 +195,13 @@ def _write(surveys: list[_Survey], output: Path, report: dict[str, str], unpack:
                 if (schema is not None or not channel.schema_id) and channel.topic not in added:
                     added.add(channel.topic)
                     writer.add_defined_topic(channel.topic, TopicDefinition.recorded(schema, channel))
-            _copy_messages(survey, writer, unpack or bytes)
+            _copy_messages(survey, writer)
 
 
-def _copy_messages(survey: _Survey, writer: BagWriter, unpack: Unpack) -> None:
+def _copy_messages(survey: _Survey, writer: BagWriter) -> None:
     with survey.path.open("rb") as stream:
         for record in _reader(survey.path, stream).records():
-            for item in record.records if isinstance(record, Group) else ():
+            for item in survey.readable(record) if isinstance(record, Group) else ():
                 if isinstance(item, Message) and item.channel_id in survey.saved:
                     topic = survey.channels[item.channel_id].topic
-                    writer.write(topic, unpack(item.data), item.log_time, item.sequence)
+                    writer.write(topic, survey.unpack(item.data), item.log_time, item.sequence)

@@ -67,8 +67,8 @@ def test_it_plans_on_schedule_until_the_last_plan_then_holds(common, vehicle, es
     assert commands[99].solver == "following"
     assert not any(command.fallback for command in commands)
     np.testing.assert_allclose([command.force for command in commands[:100]], [HELD] * 100)
-    held = law.holding.command(estimate([5.0, 0, 0, 0, 0, 0]), target())
-    np.testing.assert_array_equal(commands[105].force, held.force)
+    held = ScriptedPlanner(common, vehicle).holding.command(estimate([5.0, 0, 0, 0, 0, 0]), target())
+    np.testing.assert_array_equal(commands[100].force, held.force)
 
 
 def test_the_remainder_of_a_plan_is_the_guess_for_the_next(common, vehicle, estimate, target):
@@ -92,7 +92,7 @@ def test_an_invalid_plan_is_reported_and_lqr_or_the_plan_continues(output, words
     (command,) = simulate(law, estimate, target, 1)
     assert words in command.fallback
     assert command.fallback.endswith("LQR active")
-    held = law.holding.command(estimate([5.0, 0, 0, 0, 0, 0]), target())
+    held = ScriptedPlanner(common, vehicle).holding.command(estimate([5.0, 0, 0, 0, 0, 0]), target())
     np.testing.assert_array_equal(command.force, held.force)
     law.output = None
     commands = simulate(law, estimate, target, 25, 1)

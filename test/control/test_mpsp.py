@@ -131,7 +131,8 @@ def test_an_infeasible_plan_is_reported_and_lqr_is_active(name, changes, words, 
     command = law.command(estimate(far, chief=chief), target(GOAL))
     assert words in command.fallback
     assert command.fallback.endswith("LQR active")
-    np.testing.assert_array_equal(command.force, law.holding.command(estimate(far, chief=chief), target(GOAL)).force)
+    holding = law_of(name, eccentric, **changes).holding
+    np.testing.assert_array_equal(command.force, holding.command(estimate(far, chief=chief), target(GOAL)).force)
 
 
 @pytest.mark.parametrize("law", [MpspController, GmpspController])

@@ -94,7 +94,7 @@ def test_over_the_last_orbit_the_follower_is_where_it_is_to_be(flight: Records, 
     target = column(flight["/deputy1/target"], lambda target: target.relative_state)
     true_error = np.linalg.norm((true_states(flight) - target)[last_orbit, :3], axis=1)
     estimated_error = np.linalg.norm((estimated_states(flight) - target)[last_orbit, :3], axis=1)
-    assert target[-1].tolist() == [0.0, -100.0, 0.0, 0.0, 0.0, 0.0]
+    assert target[-1] == pytest.approx([0.0, -100.0, 0.0, 0.0, 0.0, 0.0], abs=1e-3)  # 0.7 mm of the orbit's curvature
     assert estimated_error.max() < 1.0
     assert true_error.max() < 2.0
 
