@@ -20,6 +20,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from formation_gnc.control.registry import ALGORITHMS
 from formation_gnc.errors import ConfigurationError
+from formation_gnc.plant.plant import Plant
 from formation_gnc.sil.overrides import overrides_of
 from formation_gnc.sil.process_noise import process_noise_warnings
 from formation_gnc.sil.recovery_forecast import recovery_warnings
@@ -81,6 +82,7 @@ def run(options: argparse.Namespace) -> int:
     bag = options.bag or _free_directory(scenario.name)
     if bag.exists():
         raise ConfigurationError(f"bag {bag}: exists already; name a directory that does not")
+    Plant(scenario.plant)  # rejects what cannot be flown, before any warning
     console = Console(stderr=True, highlight=False)
     ignored = [f"parameter {name}, given to all nodes: ignored, since none has it" for name in scenario.ignored]
     noted = [*ignored, *scenario.departures(), *process_noise_warnings(scenario), *recovery_warnings(scenario)]

@@ -129,7 +129,7 @@ def _reader(path: Path, stream: BinaryIO) -> SalvageReader | SqliteSalvage:
 
 
 def _surveyed(path: Path, unpack: Unpack) -> _Survey:
-    """Read a file once, without keeping its messages."""
+    """Read a file, without keeping its messages."""
     survey = _Survey(path, unpack)
     found: Counter[int] = Counter()
     missing: Counter[int] = Counter()
@@ -140,11 +140,14 @@ def _surveyed(path: Path, unpack: Unpack) -> _Survey:
         summary = verified_summary(stream)
         if summary is not None:
             survey.schemas, survey.channels = summary.schemas, summary.channels
+        else:  # a definition may stand behind messages of it, when the one before them is lost
+            for record in _reader(path, stream).records():
+                if isinstance(record, Group):
+                    survey.add_definitions(record)
         reader = _reader(path, stream)
         for record in reader.records():
             match record:
                 case Group():
-                    survey.add_definitions(record)
                     readable = survey.readable(record)
                     counts = Counter(item.channel_id for item in readable if isinstance(item, Message))
                     found.update(counts)

@@ -69,7 +69,7 @@ def damaged(tmp_path):
         (tmp_path / "log" / "log_0.mcap").write_bytes(data)
         result = recover(tmp_path / "log", tmp_path / "saved")
         messages = Messages(Bag(result.output).messages() if result.output else [])
-        assert len(messages) == (result.saved if result.output else 0)
+        assert len(messages) == (result.saved if result.output else 0), (Bag(result.output).remarks, result)
         return result, messages
 
     return run
