@@ -94,6 +94,7 @@ def test_a_law_changed_in_the_band_stays_silent() -> None:
     assert force_at(manager, 2, 6.0).any()
 
 
+@pytest.mark.thorough
 def test_a_band_spares_propellant_and_holds_the_formation() -> None:
     """Three orbits of the default scenario after its acquisition, with a tolerance of a fifth of the separation."""
     spent = {}

@@ -122,6 +122,7 @@ def forced_circle(time, target, rate=0.003):
     return target(state(time), time, np.array([state(time + 20.0)]), 20.0)
 
 
+@pytest.mark.thorough
 def test_feed_forward_tracks_a_target_that_needs_thrust(common, vehicle, estimate, target):
     errors = {}
     for kind in ("none", "linear"):

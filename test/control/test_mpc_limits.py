@@ -39,8 +39,9 @@ def limits(draw):
     return parameters, box, np.array(eclipses).reshape(-1, 2), np.array(start)
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=2, deadline=None)  # a flight each, of ten seconds or more
 @given(limits())
+@pytest.mark.thorough
 def test_limits_of_any_size_leave_a_plan_in_every_tick(estimate, target, case):
     parameters, box, eclipses, state = case
     law = ModelPredictiveController(parameters, COMMON, Vehicle(100.0, box))

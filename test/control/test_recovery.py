@@ -34,6 +34,7 @@ position, speed = st.floats(-2e3, 2e3), st.floats(-1.0, 1.0)
 
 @settings(max_examples=25, deadline=None)
 @given(st.tuples(position, position, position, speed, speed, speed), st.floats(-4.5, -2.0))
+@pytest.mark.thorough
 def test_every_trajectory_stays_off_the_limit_and_ends_at_the_target(error, exponent):
     limit = np.full(3, 10.0**exponent)
     states, accelerations = trace(HILL, error, limit)
@@ -90,6 +91,7 @@ CHIEF = state_from_elements(LOW)
 
 
 @pytest.mark.parametrize("algorithm", ["lqr", "sdre", "adaptive_lqr", "hinf"])
+@pytest.mark.thorough
 def test_every_regulator_recovers_from_half_a_kilometre(algorithm, estimate, target):
     """10 mN on 100 kg, default weights: 10 m ask for ten times the limit."""
     values = {"chief.semi_major_axis": 6978100.0, "tick": TICK, "algorithm": algorithm}

@@ -150,6 +150,7 @@ def test_every_filter_stays_within_metres_of_the_truth(changes: dict[str, Any]) 
 
 @pytest.mark.parametrize("sensors", [THREE, FIVE], ids=len)
 @pytest.mark.parametrize(("noise", "outliers"), [*TROUBLES, (30.0, 0.0), (5.0, 0.3)])
+@pytest.mark.thorough
 def test_all_sensors_at_once_are_off_by_no_more_than_their_noise(
     sensors: tuple[str, ...], noise: float, outliers: float
 ) -> None:

@@ -171,6 +171,7 @@ def propagated(elements, duration, tick, forces, body=None, epoch=0.0, substeps=
     return states[0]
 
 
+@pytest.mark.thorough
 def test_sun_and_moon_incline_a_geostationary_orbit_at_the_known_rate():
     """0.75 to 0.95 deg a year, over the Moon's 18.6-year cycle; the yearly mean of 2006 is near the top."""
     start = Elements(42164e3, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -252,6 +253,7 @@ def test_radiation_pressure_is_the_solar_constant_over_c():
     assert push[0] / double[0] == pytest.approx(4.0, rel=1e-6)
 
 
+@pytest.mark.thorough
 def test_density_decreases_without_jumps():
     heights = np.linspace(100e3, 1500e3, 5000)
     air = np.array([drag.density(EARTH_RADIUS + h, 0.0, 0.0) for h in heights])

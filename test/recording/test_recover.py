@@ -27,7 +27,7 @@ class Messages(list):
         return f"<{len(self)} messages>"
 
 
-on_one_file = settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+on_one_file = settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 @pytest.fixture(scope="module")

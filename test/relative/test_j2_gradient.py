@@ -72,6 +72,7 @@ def test_model_is_periodic_with_the_nodal_period(reference, time):
 
 
 @given(references, st.floats(0.0, 1e4), st.floats(0.1, 1.0))
+@pytest.mark.thorough
 def test_transition_has_unit_determinant(reference, time, turns):
     model = J2GradientModel(reference)
     unit = np.repeat([1.0, reference.mean_motion], 3)

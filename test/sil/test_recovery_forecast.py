@@ -40,6 +40,7 @@ def test_a_law_that_loses_the_formation_is_named_before_the_flight() -> None:
     assert "; lqr takes" in warning
 
 
+@pytest.mark.thorough
 def test_an_error_out_of_reach_is_named() -> None:
     (warning,) = circle(thrust_limit=[1e-6] * 3)
     assert "out of reach of [1e-06, 1e-06, 1e-06] N; more thrust or a closer start would do" in warning
