@@ -1,6 +1,7 @@
 """Limits of the MPC together: none contradicts another, whatever their sizes."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
