@@ -144,27 +144,25 @@ def _interpolate(table: Array, first: int, time: float, coordinate: int) -> floa
 
 
 @inline
+def _tabulated(table: Array, first: int, time: float, x: int) -> tuple[float, float, float]:
+    """Position, m, whose coordinates in a table begin with number `x`."""
+    return (
+        _interpolate(table, first, time, x),
+        _interpolate(table, first, time, x + 1),
+        _interpolate(table, first, time, x + 2),
+    )
+
+
+@inline
 def sun_position(time: float, table: Array, first: int) -> tuple[float, float, float]:
     """Position of the Sun, m, by a table (segments, 6, terms) whose first segment is `first`, or by the series."""
-    if len(table) == 0:
-        return sun(time)
-    return (
-        _interpolate(table, first, time, 0),
-        _interpolate(table, first, time, 1),
-        _interpolate(table, first, time, 2),
-    )
+    return sun(time) if len(table) == 0 else _tabulated(table, first, time, 0)
 
 
 @inline
 def moon_position(time: float, table: Array, first: int) -> tuple[float, float, float]:
     """Position of the Moon, m; as `sun_position`."""
-    if len(table) == 0:
-        return moon(time)
-    return (
-        _interpolate(table, first, time, 3),
-        _interpolate(table, first, time, 4),
-        _interpolate(table, first, time, 5),
-    )
+    return moon(time) if len(table) == 0 else _tabulated(table, first, time, 3)
 
 
 @inline

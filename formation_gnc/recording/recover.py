@@ -102,10 +102,8 @@ class _Survey:
         channel = self.channels.get(message.channel_id)
         if channel is None:
             return True
-        schema = self.schemas.get(channel.schema_id)
-        name, text, encoding = (schema.name, schema.data, schema.encoding) if schema else ("", b"", "")
         try:
-            kind = type_of(Series(channel.topic, name, text, encoding, channel.message_encoding))
+            kind = type_of(Series.of(self.schemas.get(channel.schema_id), channel))
         except BagError:  # nothing is known about it
             return True
         return kind.fits(self.unpack(message.data))

@@ -36,6 +36,12 @@ class Series(NamedTuple):
     schema_encoding: str
     message_encoding: str
 
+    @classmethod
+    def of(cls, schema: Schema | None, channel: Channel) -> "Series":
+        """The series of a channel; without a schema, of no type."""
+        name, text, encoding = (schema.name, schema.data, schema.encoding) if schema else ("", b"", "")
+        return cls(channel.topic, name, text, encoding, channel.message_encoding)
+
     @property
     def is_own(self) -> bool:
         """Whether its stamps are the ticks of a run: one of the project's types, or the clock."""
@@ -203,8 +209,7 @@ class StoredFile:
     def _define(self, schema: Schema | None, channel: Channel) -> None:
         """Take the definition of a channel; the first counts."""
         if channel.id not in self._channels:
-            name, text, encoding = (schema.name, schema.data, schema.encoding) if schema else ("", b"", "")
-            series = Series(channel.topic, name, text, encoding, channel.message_encoding)
+            series = Series.of(schema, channel)
             self._channels[channel.id] = series
             self.definitions.setdefault(series, (schema, channel))
             self._stamps.setdefault(series, _Stamps(series))

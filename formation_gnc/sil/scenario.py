@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -240,9 +241,16 @@ def matches(pattern: str, node: str) -> bool:
 def _sections(path: Path) -> Sections:
     """Node patterns of a parameter file with their parameters by dotted name, in the file's order."""
     try:
-        document = read_yaml(path.read_text())
+        return list(_parsed(path, path.read_bytes()))
     except OSError as error:
         raise ConfigurationError(f"{path}: cannot be read ({error.strerror})") from None
+
+
+@lru_cache(maxsize=4)
+def _parsed(path: Path, content: bytes) -> Sections:
+    """Sections of a parameter file; a node asks for its own and for the plant's of the same file."""
+    try:
+        document = read_yaml(content.decode())
     except RejectedYamlError as error:
         raise ConfigurationError(f"{path}: {error}") from None
     except (yaml.YAMLError, ValueError) as error:  # undecodable text, or a date that there is not

@@ -14,7 +14,9 @@ from formation_gnc.orbit.elements import Elements, elements_from_state, state_fr
 from formation_gnc.orbit.environment import Environment
 from formation_gnc.orbit.forces.force import Body
 from formation_gnc.orbit.forces.model import Forces
-from formation_gnc.orbit.propagation import Propagator, propagate_with_transition
+from formation_gnc.orbit.propagation import Propagator
+
+from .conftest import about_perigee, fall
 
 EPOCH = 7.9e8
 AIR = Forces(drag=True, density_model="nrlmsis", f107=180.0, f107a=160.0, ap=12.0)
@@ -135,27 +137,14 @@ def test_a_dive_through_the_air_of_nrlmsis_ends_alike_at_any_tick(altitude: floa
     """The end is told at the end of a part of a step, which falls at some 200 m/s."""
     ends = []
     for tick in (10.0, 60.0):
-        radius, time, message = EARTH_RADIUS + altitude, 0.0, ""
         propagator = Propagator(tick, forces=AIR, bodies=(BODY,), epoch=EPOCH)
-        states = np.array([[radius, 0.0, 0.0, 0.0, np.sqrt(MU / radius), 0.0]])
-        while not message:
-            try:
-                states = propagator.propagate(time, states, np.zeros((1, 3)))
-            except ImpactError as error:
-                message = str(error)
-            assert np.linalg.norm(states[0, :3]) < radius + 10e3
-            time += tick
-        found = re.search(r"at ([\d.]+) s, latitude .* longitude ([-\d.]+) deg: state (.*)$", message)
-        assert found is not None, message
-        ends.append((float(found[1]), float(found[2])))
+        ends.append(fall(propagator, EARTH_RADIUS + altitude, tick))
     assert ends[0][0] == pytest.approx(ends[1][0], abs=120.0)
     assert ends[0][1] == pytest.approx(ends[1][1], abs=2.0)
 
 
 def test_an_impact_between_two_ticks_is_seen_with_both_models() -> None:
-    perigee, apogee = EARTH_RADIUS - 80e3, EARTH_RADIUS + 1000e3
-    speed = np.sqrt(2.0 * MU * (1.0 / perigee - 1.0 / (perigee + apogee)))
-    start = propagate_with_transition(np.array([perigee, 0.0, 0.0, 0.0, speed, 0.0]), np.zeros(3), -900.0, 90)[0][None]
+    start = about_perigee(80e3, 900.0)
     assert np.linalg.norm(start[0, :3]) > EARTH_RADIUS + 100e3
     forces = Forces(sun=True, moon=True, drag=True, density_model="nrlmsis", ephemeris="de421")
     with pytest.raises(ImpactError) as raised:

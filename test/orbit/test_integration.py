@@ -6,31 +6,21 @@ import numpy as np
 import pytest
 
 from formation_gnc.errors import ImpactError
-from formation_gnc.orbit.constants import EARTH_RADIUS, MU
+from formation_gnc.orbit.constants import EARTH_RADIUS
 from formation_gnc.orbit.forces.force import Body
 from formation_gnc.orbit.forces.model import Forces
-from formation_gnc.orbit.propagation import Propagator, propagate_with_transition
+from formation_gnc.orbit.propagation import Propagator
+
+from .conftest import about_perigee, fall
 
 EQUATOR = 6378136.3
 
 
 def impact(altitude: float, tick: float) -> tuple[float, float, float]:
     """Time (s), longitude (deg) and speed (m/s) at which a circular orbit in dense air ends."""
-    radius = EQUATOR + altitude
     propagator = Propagator(tick, forces=Forces(drag=True), bodies=(Body(),))
-    states, time = np.array([[radius, 0.0, 0.0, 0.0, np.sqrt(MU / radius), 0.0]]), 0.0
-    message = ""
-    while not message:
-        try:
-            states = propagator.propagate(time, states, np.zeros((1, 3)))
-        except ImpactError as error:
-            message = str(error)
-        assert np.linalg.norm(states[0, :3]) < radius + 10e3
-        time += tick
-    found = re.search(r"at ([\d.]+) s, latitude .* longitude ([-\d.]+) deg: state (.*)$", message)
-    assert found is not None
-    speed = np.linalg.norm(np.fromstring(found[3].strip("[]"), sep=",")[3:])
-    return float(found[1]), float(found[2]), float(speed)
+    time, longitude, state = fall(propagator, EQUATOR + altitude, tick)
+    return time, longitude, float(np.linalg.norm(state[3:]))
 
 
 @pytest.mark.parametrize("altitude", [150e3, 80e3, 22e3])
@@ -41,14 +31,6 @@ def test_a_dive_through_dense_air_ends_alike_at_any_tick(altitude: float, tick: 
     assert time == pytest.approx(fine_time, abs=tick)  # told at the end of a part of a step
     assert longitude == pytest.approx(fine_longitude, abs=0.1 + 0.005 * tick)  # the ground turns by 0.004 deg/s
     assert speed == pytest.approx(fine_speed, rel=0.05)  # falling at its limit
-
-
-def about_perigee(depth: float, before: float) -> np.ndarray:
-    """State (1, 6) a time (s) before an equatorial perigee that lies so deep (m) below the surface."""
-    perigee, apogee = EARTH_RADIUS - depth, EARTH_RADIUS + 1000e3
-    speed = np.sqrt(2.0 * MU * (1.0 / perigee - 1.0 / (perigee + apogee)))
-    state = np.array([perigee, 0.0, 0.0, 0.0, speed, 0.0])
-    return propagate_with_transition(state, np.zeros(3), -before, 60)[0][None]
 
 
 def test_an_impact_between_two_ticks_is_seen() -> None:
