@@ -42,7 +42,8 @@ bench: .venv/.verify
 	@$(in_environment) python -m bench
 
 verify: .venv/.verify
-	@$(in_environment) $(pytest) --timeout 0 -m slow && python -m verification
+	@$(in_environment) $(pytest) --timeout 0 -m slow && \
+		$(pytest) $(shared) --timeout 0 --hypothesis-profile search -m "not sil and not slow" && python -m verification
 
 # Which ROS, and for which place: a change of either is a new environment.
 .ros: force

@@ -97,6 +97,7 @@ class Transfer:
         return f"{self.distance:.0f} m to go, shortest time {words}"
 
 
+@np.errstate(all="ignore")  # an estimate may be as large as a float
 def transfer_to(target: Vector, estimate: NavigationState, parameters: GuidanceParameters) -> Transfer | None:
     """The transfer from an estimate to a target (6,); None for an estimate that is not finite, or has no mass."""
     error = estimate.relative_state - target

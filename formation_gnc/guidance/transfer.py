@@ -65,6 +65,8 @@ def _reach(error: Vector, acceleration: Vector, mean_motion: float, duration: fl
     # sum(effect u) + multiple * free = 0 with |u| <= 1, largest multiple
     free = model.transition(0.0, duration) @ error
     columns = np.column_stack([effect.transpose(1, 0, 2).reshape(6, -1), free]) / size[:, None]
+    if not np.isfinite(columns).all():  # beyond the range of a double
+        return 0.0
     cost = np.zeros(columns.shape[1])
     cost[-1] = -1.0
     bounds = [(-1.0, 1.0)] * (len(cost) - 1) + [(0.0, 2.0)]

@@ -38,6 +38,14 @@ def test_no_error_takes_no_time_and_no_thrust_never_arrives() -> None:
     assert shortest_time(np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0]), np.array([1e-4, 1e-4, 0.0]), RATE) == math.inf
 
 
+@pytest.mark.filterwarnings("ignore:overflow", "ignore:invalid value")
+@pytest.mark.parametrize("size", [1e30, 1e150, 1e300, 1.7e308])
+@pytest.mark.parametrize("limit", [1e-4, 1e-300, 1e308])
+def test_an_error_as_large_as_a_float_is_out_of_reach(size: float, limit: float) -> None:
+    for error in size * np.vstack([np.eye(6), np.ones((1, 6))]):
+        assert shortest_time(error, np.full(3, limit), RATE) in (math.inf, 0.0) or limit > 1.0
+
+
 def test_transfer_with_kremmydas_thrusters_takes_over_a_revolution() -> None:
     # 8 uN on 1.5 kg, from rest a kilometre ahead to the in-plane ellipse of a kilometre: half a m/s
     error = np.array([0.0, 0.0, 0.0, 0.5 * 1000.0 * RATE, 0.0, 0.0])
