@@ -7,7 +7,6 @@ unexport PYTHONDONTWRITEBYTECODE  # or each process of a flight compiles the pac
 in_environment := source ./env.sh &&
 # An installed ROS puts pytest plug-ins of its own in the way.
 pytest := python -m pytest --disable-plugin-autoload -p randomly -p timeout -p hypothesispytest --timeout 300
-# Tests without processes share the cores; those with processes have the machine for themselves.
 shared := -p xdist -n auto --dist worksteal
 
 .PHONY: help setup demo test test-fast check bench verify lock clean force
@@ -32,8 +31,7 @@ check: setup
 	@$(in_environment) ruff check . && ruff format --check . && mypy
 
 test: check
-	@$(in_environment) $(pytest) $(shared) -m "not sil and not slow"; status=$$?; \
-		$(pytest) -m "sil and not slow" && exit $$status
+	@$(in_environment) $(pytest) $(shared) -m "not slow"
 
 test-fast: setup
 	@$(in_environment) $(pytest) $(shared) --hypothesis-profile fast -m "not sil and not slow and not thorough"

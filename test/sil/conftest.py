@@ -14,6 +14,7 @@ from typing import Any
 import domain_coordinator
 import pytest
 
+from formation_gnc.cli import main
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight.graph import MODULES
 from formation_gnc.recording import Bag
@@ -136,6 +137,19 @@ def desk(tmp_path: Path) -> Iterator[Desk]:
         desk = Desk(tmp_path, domain)
         yield desk
         desk.clear()
+
+
+@pytest.fixture
+def fly(tmp_path: Path, without_pictures: None) -> Callable[..., Bag]:
+    """Flights by `formation-gnc sil` from this process, of nodes that are processes; the bag of each."""
+
+    def fly(*arguments: str, directory: Path = tmp_path, scenario: str = "leader_follower") -> Bag:
+        bag = directory / "bag"
+        flags = ["--bag", str(bag), "--set", f"plant.deadline={DEADLINE}"]
+        assert main(["sil", scenario, *flags, *arguments]) == 0
+        return Bag(bag)
+
+    return fly
 
 
 class Sil:

@@ -39,8 +39,8 @@ def events(bag: Path, kind: EventKind) -> list[tuple[int, str]]:
 def test_nodes_started_by_hand_in_any_order_fly_and_swap_the_law_in_flight(desk: Desk) -> None:
     bag = desk.directory / "bag"
     options = {
-        # slow enough for a person to type in flight: about 6 s of wall time
-        "plant": {"duration": 600.0, "real_time_factor": 100.0, "wait_for_recorder": True},
+        # slow enough for a person to type in flight, on a busy machine too: 20 s of wall time
+        "plant": {"duration": 600.0, "real_time_factor": 30.0, "wait_for_recorder": True},
         "recorder": {"bag": bag},
     }
     kinds = ["plant", "recorder", *PARTS]
@@ -57,7 +57,7 @@ def test_nodes_started_by_hand_in_any_order_fly_and_swap_the_law_in_flight(desk:
     assert terminals["plant"].wait() == 0
     for kind in (*PARTS, "recorder"):
         terminals[kind].signal(signal.SIGINT)
-        assert terminals[kind].wait(5.0) == 0, terminals[kind].text
+        assert terminals[kind].wait() == 0, terminals[kind].text
 
     recorded = Bag(bag)
     assert {recorded.topics[topic].count for topic in GNC_TOPICS} == {600}, "no message missed or repeated"
@@ -152,7 +152,7 @@ def test_a_restarted_node_rejoins_and_its_gap_is_logged_and_replays(
     assert capsys.readouterr().out.splitlines()[-1] == "identical on every GNC topic"
 
 
-def test_every_law_has_the_same_bits_on_graph_and_in_process(sil: StartSil, tmp_path: Path) -> None:
+def test_every_law_has_the_same_bits_on_graph_and_in_process(fly: Callable[..., Bag], tmp_path: Path) -> None:
     """One after the other; the first with a final time flies its reconfiguration to the end, and holds."""
     laws = list(ALGORITHMS)
     weights = {"position_error": [10.0] * 3, "velocity_error": [0.1] * 3, "thrust": [0.002] * 3}
@@ -171,16 +171,8 @@ def test_every_law_has_the_same_bits_on_graph_and_in_process(sil: StartSil, tmp_
     (tmp_path / "laws.yaml").write_text(json.dumps(scenario))  # YAML too, without the aliases that ROS rejects
     bags = []
     for name, extra in (("graph", []), ("process", ["--in-process"])):
-        run = sil(
-            "--duration",
-            str(begins[-1]),
-            *extra,
-            directory=tmp_path / name,
-            scenario=str(tmp_path / "laws.yaml"),
-        )
-        status, _, errors = run.finish(2 * PATIENCE)
-        assert status == 0, errors
-        bags.append(Bag(run.bag))
+        duration, scenario_file = str(begins[-1]), str(tmp_path / "laws.yaml")
+        bags.append(fly("--duration", duration, *extra, directory=tmp_path / name, scenario=scenario_file))
     assert identical(*bags, [*GNC_TOPICS, "/events"]) == []
     assert [tick for tick, _ in events(bags[0].path, EventKind.PARAMETERS)] == begins[1:-1]
     assert events(bags[0].path, EventKind.MISS) == []
@@ -256,7 +248,7 @@ def test_the_nodes_end_when_the_command_is_killed(sil: StartSil) -> None:
     children = run.children()
     os.kill(run.process.pid, signal.SIGKILL)
     processes = [Path(f"/proc/{pid}") for pid in children.values()]
-    wait_until(lambda: not any(process.exists() for process in processes), "all nodes to end", 10.0)
+    wait_until(lambda: not any(process.exists() for process in processes), "all nodes to end")
     assert Bag(run.bag).damage is None
 
 

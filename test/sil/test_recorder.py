@@ -29,7 +29,7 @@ from formation_gnc.recording.recover import PARTLY_LOST, recover
 from formation_gnc.transport.qos import LATEST, quality
 from formation_gnc.types import NANOSECONDS
 
-from .conftest import GNC_TOPICS, PARTS, PATIENCE, Desk, Sil, Terminal, wait_until
+from .conftest import GNC_TOPICS, PARTS, PATIENCE, Desk, Terminal, wait_until
 
 pytestmark = pytest.mark.sil
 
@@ -56,10 +56,8 @@ def stop(*terminals: Terminal) -> None:
         assert terminal.wait() == 0, terminal.text
 
 
-def test_a_bag_says_all_of_its_run_and_nothing_of_the_machine(sil: Callable[..., Sil]) -> None:
-    run = sil("--duration", "200", "--seed", "7")
-    assert run.finish()[0] == 0
-    bag = Bag(run.bag)
+def test_a_bag_says_all_of_its_run_and_nothing_of_the_machine(fly: Callable[..., Bag]) -> None:
+    bag = fly("--duration", "200", "--seed", "7")
     assert bag.metadata["run"] == {"scenario": "leader_follower", "seed": "7"}
     assert {"formation_gnc", "commit", "python", "numpy", "mcap"} <= bag.metadata["versions"].keys()
     nodes = ("/plant", "/recorder", *(f"/deputy1/{part}" for part in PARTS))
@@ -68,10 +66,10 @@ def test_a_bag_says_all_of_its_run_and_nothing_of_the_machine(sil: Callable[...,
     assert set(bag.metadata[LOST].values()) == {"0"}
     assert set(bag.attachments) == {"leader_follower.yaml", LAYOUT}
     said = f"{bag.metadata} {bag.attachments}"
-    assert str(run.bag.parent) not in said
+    assert str(bag.path.parent) not in said
     assert str(Path.home()) not in said
     for topic in GNC_TOPICS:
-        with Reader(run.bag) as reader, (run.bag / "bag_0.mcap").open("rb") as stream:
+        with Reader(bag.path) as reader, (bag.path / "bag_0.mcap").open("rb") as stream:
             assert reader.topics[topic].msgcount == 200
             numbers = [m.sequence for _, _, m in make_reader(stream).iter_messages([topic])]
             assert numbers == list(range(1, 201)), "the log itself shows that nothing is missing"

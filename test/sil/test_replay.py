@@ -20,22 +20,21 @@ from formation_gnc.recording import Bag, identical
 from formation_gnc.records import EventKind
 from formation_gnc.sil.scenario import find_scenario
 
-from .conftest import GNC_TOPICS, PARTS, PATIENCE, Desk, Sil, has_messages, wait_until
+from .conftest import GNC_TOPICS, PARTS, PATIENCE, Desk, has_messages, wait_until
 
 pytestmark = pytest.mark.sil
 
 
 def test_an_unchanged_replay_of_a_graph_run_gives_the_recorded_bits(
-    sil: Callable[..., Sil], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    fly: Callable[..., Bag], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     scenario = yaml.safe_load(find_scenario("leader_follower").read_text())
     swaps = ["{at: 100.0, algorithm: coast}", "{at: 200.0, algorithm: lqr}"]
     scenario["/**/controller"]["ros__parameters"]["schedule"] = swaps
     (tmp_path / "swaps.yaml").write_text(yaml.safe_dump(scenario))
-    run = sil("--duration", "300", scenario=str(tmp_path / "swaps.yaml"))
-    assert run.finish()[0] == 0
-    assert main(["replay", str(run.bag), "--bag", str(tmp_path / "again")]) == 0
-    recorded, again = Bag(run.bag), Bag(tmp_path / "again")
+    recorded = fly("--duration", "300", scenario=str(tmp_path / "swaps.yaml"))
+    assert main(["replay", str(recorded.path), "--bag", str(tmp_path / "again")]) == 0
+    again = Bag(tmp_path / "again")
     assert list(again.arrays("/events")["kind"]).count(EventKind.PARAMETERS) == 2
     assert again.topics["/deputy1/timing"].count == 900, "of every part at every tick"
     assert identical(recorded, again, gnc_topics(recorded)) == []
@@ -80,13 +79,14 @@ def call(user: Any, executor: SingleThreadedExecutor, kind: Any, service: str, r
     return answer.result()
 
 
-def test_the_replay_node_plays_in_step_with_real_nodes_to_the_same_bits(desk: Desk, sil: Callable[..., Sil]) -> None:
-    run = sil("--duration", "200", "--in-process")
-    assert run.finish()[0] == 0
+def test_the_replay_node_plays_in_step_with_real_nodes_to_the_same_bits(
+    desk: Desk, fly: Callable[..., Bag], tmp_path: Path
+) -> None:
+    played = fly("--duration", "200", "--in-process", directory=tmp_path / "played")
     bag = desk.directory / "again"
     recorder = desk.start("recorder", bag=bag)
     parts = [desk.start(kind) for kind in PARTS]
-    player = desk.start("replay", bag=run.bag, paused=True)
+    player = desk.start("replay", bag=played.path, paused=True)
     context = Context()
     rclpy.init(context=context, domain_id=desk.domain)
     user = rclpy.create_node("user", context=context)
@@ -110,7 +110,7 @@ def test_the_replay_node_plays_in_step_with_real_nodes_to_the_same_bits(desk: De
     for terminal in (*parts, recorder):
         terminal.signal(signal.SIGINT)
         assert terminal.wait() == 0, terminal.text
-    assert identical(Bag(run.bag), Bag(bag), GNC_TOPICS) == []
+    assert identical(played, Bag(bag), GNC_TOPICS) == []
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from formation_gnc.cli import main
 from formation_gnc.recording import Bag
 from formation_gnc.recording.decode import MessageType
 
-from .conftest import PARTS, PATIENCE, Desk, Sil
+from .conftest import PARTS, PATIENCE, Desk
 
 pytestmark = pytest.mark.sil
 
@@ -146,16 +146,15 @@ def test_a_viewer_sees_a_running_graph_live(desk: Desk, view: Callable[..., View
 
 
 def test_a_bag_is_played_at_its_pace_and_where_a_viewer_seeks(
-    sil: Callable[..., Sil], view: Callable[..., View]
+    fly: Callable[..., Bag], view: Callable[..., View]
 ) -> None:
-    run = sil("--duration", "400", "--in-process")
-    assert run.finish()[0] == 0
-    server = view(0, "--bag", str(run.bag), "--rate", "20")
+    bag = fly("--duration", "400", "--in-process")
+    server = view(0, "--bag", str(bag.path), "--rate", "20")
     viewer = Viewer(server.port)
     started = time.monotonic()
     seen = viewer.watch(["/truth"], 30)["/truth"]
     assert time.monotonic() - started > 1.0, "29 s at 20 times real time"
-    recorded = Bag(run.bag).arrays("/truth")
+    recorded = bag.arrays("/truth")
     rows = [stamp // 10**9 for stamp, _ in seen]
     assert rows == list(range(rows[0], rows[0] + 30))
     for row, (_, truth) in zip(rows, seen, strict=True):
