@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from textwrap import fill
-from time import perf_counter
+from time import monotonic, perf_counter
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 
 LOST_STATUS = 3
 """Exit status of a run whose formation is lost."""
+
+PATIENCE = 3.0
+"""Wall time (s) between lines that say what the run waits for."""
 
 COLUMNS = 2
 """Deputies beyond which the summary has a row, not a column, for each."""
@@ -137,6 +140,7 @@ class _Display:
     def __init__(self, console: Console, ticks: int) -> None:
         self._console = console
         self._said = ""
+        self._said_at = monotonic()
         self._bar = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
@@ -159,11 +163,11 @@ class _Display:
     def say(self, text: str) -> None:
         if text != self._said:
             self._console.print(text)
-            self._said = text
+            self._said, self._said_at = text, monotonic()
 
     def show(self, message: str, tick: float, speedup: float) -> None:
         self._bar.update(self._task, description=message, completed=tick, speedup=speedup)
-        if message.startswith("waiting"):
+        if message.startswith("waiting") and monotonic() - self._said_at > PATIENCE:
             self.say(message)
 
 

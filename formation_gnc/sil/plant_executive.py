@@ -23,6 +23,9 @@ RECORDER = "/recorder"
 CONTRADICTIONS = 3
 """Contradicting answers of a deputy that show two commanders; one that is started again may contradict itself once."""
 
+NAMED = 3
+"""Topics without a publisher that are named."""
+
 LINGERING = 30.0
 """Wall time (s) after which DDS has forgotten a node that was killed: two of one name for longer are two."""
 
@@ -157,7 +160,8 @@ class PlantExecutive:
         absent = self._absent()
         if absent:
             modules = dict(self.simulation.answers())
-            yield f"a publisher of {', '.join(f'{topic} ({modules[topic]})' for topic in absent)}"
+            named = ", ".join(f"{topic} ({modules[topic]})" for topic in absent[:NAMED])
+            yield f"a publisher of {named}" + (f" and {len(absent) - NAMED} more" if len(absent) > NAMED else "")
         yield from self._rivals((*self._own, *self._answers))
         if self._parameters.wait_for_recorder and not (
             self.simulation.barrier.recorded is not None and self._around.recorder_listens()

@@ -86,6 +86,12 @@ def complete(graph: Graph) -> Graph:
     return graph
 
 
+def test_of_many_topics_without_publisher_three_are_named(graph: Graph) -> None:
+    fleet = load_scenario("tetrahedral", {"/plant": {"duration": 3.0}}).plant
+    PlantExecutive(fleet, graph).check(0.0)
+    assert graph.said == [f"waiting for a publisher of {ANSWERS} and 9 more"]
+
+
 def test_the_run_starts_when_every_answer_has_a_publisher(graph: Graph) -> None:
     executive = start(graph)
     assert graph.said == [f"waiting for a publisher of {ANSWERS}"]
