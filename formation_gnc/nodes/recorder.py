@@ -12,8 +12,6 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import Trigger
 
 from formation_gnc.flight import topics
-from formation_gnc.flight.graph import GRAPH
-from formation_gnc.recording.parameter_collection import PLANT
 from formation_gnc.recording.parameters import RecorderParameters
 from formation_gnc.recording.provenance import provenance
 from formation_gnc.recording.session import RecordingSession
@@ -68,31 +66,10 @@ class RecorderNode(ConfiguredNode):
     def _open(self, topic: str, type_name: str, latched: bool) -> Callback:
         return self.session.open_topic(topic, type_name, partial(self.publishers_of, topic), latched)
 
-    def _nodes_of_run(self, now: float) -> dict[str, str]:
-        """Full names of the nodes with parameters, by their names within the formation.
-
-        A node of the run counts by what it publishes, whatever its name.
-        """
-        formation, known = self.full_name("/"), self._reader.nodes()
-        nodes = {f"/{each.removeprefix(formation)}": each for each in known if each.startswith(formation)}
-        deputies = self.session.parameters.values.get(PLANT, {}).get("deputies", ())
-        roles = {PLANT: topics.TRUTH.name}
-        roles |= {f"/{deputy}/{row.name}": row.answer.of(deputy) for deputy in deputies for row in GRAPH}
-        for role, topic in roles.items():
-            if role in nodes:
-                continue
-            for full_name in self.publishers_of(topic):
-                if full_name in known:
-                    nodes[role] = full_name
-                else:
-                    self.session.parameters.offers_none(role, now)
-        return nodes
-
     def _look(self) -> None:
         session, now = self.session, monotonic()
         self._raw_topics.look()
-        nodes = self._nodes_of_run(now)
-        session.parameters.appeared(nodes)
+        nodes = session.parameters.find(self._reader.nodes(), self.full_name("/"), self.publishers_of, now)
         for node, record in session.parameters.due(now).items():
             if node not in nodes:
                 continue

@@ -1,9 +1,10 @@
 """Collection of the parameters of all nodes of a run, for a recording."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from formation_gnc.flight import topics
 from formation_gnc.flight.graph import GRAPH
 from formation_gnc.recording.provenance import parameters_record
 
@@ -27,6 +28,35 @@ class ParameterCollection:
         self._wanted: dict[str, str] = {}
         self._asked: dict[str, float] = {}
         self._mute: dict[str, float] = {}
+
+    def find(
+        self, known: Collection[str], formation: str, publishers_of: Callable[[str], Collection[str]], now: float
+    ) -> dict[str, str]:
+        """Take the nodes that exist; returns their full names by those within the formation.
+
+        A node of the run counts by what it publishes, whatever its name.
+
+        Args:
+            known: full names of the nodes that offer parameter services.
+            formation: its namespace, with a slash at the end.
+            publishers_of: full names of the nodes that publish a topic.
+            now: s; a node of the run that offers no parameter services may yet.
+        """
+        nodes = {f"/{each.removeprefix(formation)}": each for each in known if each.startswith(formation)}
+        for role, topic in self._roles().items():
+            for full_name in publishers_of(topic) if role not in nodes else ():
+                if full_name in known:
+                    nodes[role] = full_name
+                else:
+                    self._mute.setdefault(role, now)
+        self.appeared(nodes)
+        return nodes
+
+    def _roles(self) -> dict[str, str]:
+        """What each node of the run publishes, by its name."""
+        deputies = self.values.get(PLANT, {}).get("deputies", ())
+        answers = {f"/{deputy}/{row.name}": row.answer.of(deputy) for deputy in deputies for row in GRAPH}
+        return {PLANT: topics.TRUTH.name} | answers
 
     def appeared(self, nodes: Collection[str]) -> list[str]:
         """Take the nodes that exist; returns the new ones."""
@@ -61,14 +91,9 @@ class ParameterCollection:
         self.values[node] = values
         return True
 
-    def offers_none(self, node: str, now: float) -> None:
-        """Note the time (s) at which a node of the run offers no parameter services; it may yet."""
-        self._mute.setdefault(node, now)
-
     def is_complete(self, now: float) -> bool:
         """Whether the parameters of the plant and of every deputy's modules, if they have any, are known."""
-        deputies = self.values.get(PLANT, {}).get("deputies", ())
-        nodes = [f"/{deputy}/{row.name}" for deputy in deputies for row in GRAPH]
+        nodes = self._roles().keys() - {PLANT}
         return bool(nodes) and all(
             self.values.get(node) or now - self._mute.get(node, now) > ASK_AGAIN for node in nodes
         )

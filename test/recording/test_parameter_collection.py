@@ -57,7 +57,18 @@ def test_a_node_started_again_is_asked_again_for_its_first_answer() -> None:
 
 def test_a_node_without_parameter_services_is_not_waited_for_long() -> None:
     collection = ParameterCollection(values={"/plant": {"deputies": ["deputy1"]}})
-    for row in GRAPH:
-        collection.offers_none(f"/deputy1/{row.name}", 1.0)
+    assert collection.find(["/plant"], "/", lambda topic: ["/somebody"], 1.0) == {"/plant": "/plant"}
     assert not collection.is_complete(1.0)
     assert collection.is_complete(1.0 + 2.0 * ASK_AGAIN)
+
+
+def test_a_node_of_another_name_counts_by_what_it_publishes() -> None:
+    collection = complete()
+    publishers = {"/truth": ["/alpha/world"], "/deputy1/thrust": ["/alpha/deputy1/law"]}
+    known = ["/alpha/world", "/alpha/deputy1/law", "/alpha/deputy1/guidance", "/beta/plant"]
+    found = collection.find(known, "/alpha/", lambda topic: publishers.get(topic, []), 0.0)
+    assert found["/plant"] == "/alpha/world"
+    assert found["/deputy1/controller"] == "/alpha/deputy1/law"
+    assert found["/deputy1/guidance"] == "/alpha/deputy1/guidance"
+    assert "/alpha/plant" not in found
+    assert "/beta/plant" not in found.values(), "of another formation"
