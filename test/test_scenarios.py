@@ -13,7 +13,7 @@ from formation_gnc.sil.scenario import find_scenario, load_scenario
 pytestmark = pytest.mark.usefixtures("without_pictures")
 
 SCENARIOS = sorted(path.stem for path in find_scenario("leader_follower").parent.glob("*.yaml"))
-TICKS = 60
+TICKS = 30
 
 
 @pytest.mark.parametrize("name", SCENARIOS)

@@ -100,13 +100,14 @@ def test_a_band_spares_propellant_and_holds_the_formation() -> None:
     spent = {}
     for band in (0.0, 20.0):
         plant = {"duration": 17400.0, "deputy1.relative_state": [0.0, -100.0, 0.0, 0.0, 0.0, 0.0]}
-        overrides: dict[str, dict[str, Any]] = {"/plant": plant, "/**/controller": {"dead_band": [band] * 3}}
+        overrides: dict[str, dict[str, Any]] = {"/**": {"tick": 10.0}, "/plant": plant}
+        overrides["/**/controller"] = {"dead_band": [band] * 3}
         run, records = Run(load_scenario("leader_follower", overrides)), dict[str, Any]()
         total, worst = 0.0, 0.0
         while not run.plant.finished:
             run.tick(records.__setitem__)
             error = records["/truth"].deputies[0].relative_state - records["/deputy1/target"].relative_state
-            total += float(np.abs(records["/deputy1/thrust"].force).sum()) / 100.0
+            total += float(np.abs(records["/deputy1/thrust"].force).sum()) / 10.0
             worst = max(worst, float(np.abs(error[:3]).max()))
         spent[band] = total
         assert worst < 25.0  # the band, and what is left of the drift when it is turned round

@@ -110,12 +110,12 @@ def test_fleet_commanded_in_flight_changes_formation_at_one_tick(
 ) -> None:
     guidance = {"assignment": "delta_v", "schedule": [], "reconfiguration_time": 3000.0}
     paced = {
-        "duration": 600.0,
-        "real_time_factor": 20.0,  # half a minute of wall time to set all schedules
+        "duration": 400.0,
+        "real_time_factor": 20.0,  # a quarter of a minute of wall time to set all schedules
         "deadline": DEADLINE,
     }
     scenario = load_scenario("tetrahedral", {"/plant": paced, "/**/guidance": guidance})
-    at = 500
+    at = 300
     order = [f"{{at: {at}.0, formation: three_in_plane_one_out}}"]
     domain, answers = 0, []
 
@@ -138,7 +138,7 @@ def test_fleet_commanded_in_flight_changes_formation_at_one_tick(
     bag = Bag(tmp_path / "bag")
     for name in scenario.deputies:
         formations = bag.arrays(f"/{name}/target")["formation"].tolist()
-        assert formations == ["tetrahedral"] * at + ["three_in_plane_one_out"] * (600 - at)
+        assert formations == ["tetrahedral"] * at + ["three_in_plane_one_out"] * (400 - at)
     events = bag.arrays("/events")
     kinds = list(zip(events["kind"].tolist(), events["tick"].tolist(), strict=True))
     assert kinds.count((EventKind.ASSIGNMENT, at)) == 4
