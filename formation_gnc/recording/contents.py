@@ -5,7 +5,6 @@ from collections import Counter
 from collections.abc import Collection, Iterator
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from mcap.records import Channel, Schema
@@ -15,7 +14,7 @@ from formation_gnc.errors import BagError
 from formation_gnc.flight import topics
 from formation_gnc.recording.files import missing_files, open_files
 from formation_gnc.recording.order import Recorded, RunOrder, is_free, separate
-from formation_gnc.recording.stored_file import OWN_PACKAGE, Series, Span, type_of
+from formation_gnc.recording.stored_file import OWN_PACKAGE, BagMessage, Series, Span, type_of
 
 _OWN_TYPES = {
     topic.name: (OWN_PACKAGE + "msg/" + topic.record.message if topic.record else topic.message.replace("/", "/msg/"))
@@ -27,18 +26,6 @@ def own_type(topic: str) -> str:
     """Message type that a run has on a topic of this name; empty for a topic of others."""
     name = topic.rpartition("/")[2] if topics.deputy_of(topic) else topic
     return _OWN_TYPES.get(name, "")
-
-
-class BagMessage(NamedTuple):
-    """A message of a bag."""
-
-    topic: str
-    row: int
-    """Its place among those of its topic."""
-    stamp: int
-    """ns."""
-    data: bytes
-    sequence: int
 
 
 class BagContents:
@@ -140,18 +127,13 @@ class BagContents:
         Raises:
             BagError: the file is damaged.
         """
-        file = self._files[number]
-        places = {series: place for (each, series), place in self._places.items() if each == number}
-        series = {each for each in places if each.topic in wanted}
-        if series:
-            for message in file.series_messages(span, series):
-                yield BagMessage(
-                    message.series.topic,
-                    places[message.series] + message.row,
-                    message.stamp,
-                    message.data,
-                    message.sequence,
-                )
+        file, places = self._files[number], self._places
+        rows = {
+            series: row
+            for (each, series), row in places.items()
+            if each == number and series.topic in wanted and series in file.definitions
+        }
+        return file.messages(span, rows) if rows else iter(())
 
     @cached_property
     def orders(self) -> list[RunOrder]:

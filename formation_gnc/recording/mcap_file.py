@@ -2,7 +2,7 @@
 
 import struct
 import zlib
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator
 from io import SEEK_END, BytesIO
 from pathlib import Path
 from typing import BinaryIO
@@ -17,7 +17,7 @@ from mcap.stream_reader import get_chunk_data_stream
 from mcap.summary import Summary
 
 from formation_gnc.errors import BagError
-from formation_gnc.recording.stored_file import Series, Span, StoredFile
+from formation_gnc.recording.stored_file import Span, StoredFile
 
 MAGIC = b"\x89MCAP0\r\n"
 UNREADABLE = (
@@ -106,31 +106,33 @@ class McapFile(StoredFile):
             case Attachment():
                 self.attachments[record.name] = record.data
 
-    def _span_records(self, span: Span, channels: Mapping[int, Series]) -> Iterator[tuple[int, bytes, int]]:
+    def _span_records(self, span: Span, channels: Collection[int]) -> Iterable[tuple[int, bytes, int]]:
+        if span.offset is None:
+            return self._all_records(channels)
         with self._open() as stream:
+            stream.seek(span.offset + _RECORD.size)
             try:
-                for record in self._messages(stream, span, channels):
-                    if isinstance(record, Message) and record.channel_id in channels:
-                        yield record.channel_id, self._unpack(record.data), record.sequence
+                found = chunk_messages(chunk_content(Chunk.read(ReadDataStream(stream))), channels)
             except UNREADABLE as error:
-                if self.damage is None or span.offset is not None:
-                    raise self._damaged(span.offset, f"({error})") from None
+                raise self._damaged(span.offset, f"({error})") from None
+        if self._unpack is bytes:  # as they are
+            return found
+        return [(channel, self._unpack(data), sequence) for channel, data, sequence in found]
+
+    def _all_records(self, channels: Collection[int]) -> Iterator[tuple[int, bytes, int]]:
+        with self._open() as stream:
+            stream.seek(len(MAGIC))
+            try:
+                for offset, record in file_records(stream):
+                    for each in _unpacked(record, offset) if isinstance(record, Chunk) else (record,):
+                        if isinstance(each, Message) and each.channel_id in channels:
+                            yield each.channel_id, self._unpack(each.data), each.sequence
+            except UNREADABLE as error:
+                if self.damage is None:
+                    raise self._damaged(None, f"({error})") from None
 
     def _damaged(self, offset: int | None, reason: str) -> BagError:
         return BagError(f"{self.path}: damaged in the chunk at byte {offset} {reason}; recover it first")
-
-    @staticmethod
-    def _messages(stream: BinaryIO, span: Span, channels: Collection[int]) -> Iterator[FileRecord]:
-        if span.offset is not None:
-            stream.seek(span.offset + _RECORD.size)
-            yield from chunk_records(chunk_content(Chunk.read(ReadDataStream(stream))), channels)
-            return
-        stream.seek(len(MAGIC))
-        for offset, record in file_records(stream):
-            if isinstance(record, Chunk):
-                yield from _unpacked(record, offset)
-            else:
-                yield record
 
 
 def file_records(stream: BinaryIO) -> Iterator[tuple[int, FileRecord]]:
@@ -229,15 +231,11 @@ def chunk_content(chunk: Chunk) -> bytes:
     return stream.read(length)
 
 
-def chunk_records(content: bytes, channels: Collection[int] | None = None) -> Iterator[Message | Schema | Channel]:
+def chunk_records(content: bytes) -> Iterator[Message | Schema | Channel]:
     """Records of a decompressed chunk, in order; raises one of UNREADABLE at a truncated record.
 
     Unlike mcap's `breakup_chunk` it holds one record at a time, detects a truncated one, and takes a third of
     the time.
-
-    Args:
-        content: of the chunk.
-        channels: of the messages; None for all.
     """
     offset, end = 0, len(content)
     while offset < end:
@@ -247,12 +245,31 @@ def chunk_records(content: bytes, channels: Collection[int] | None = None) -> It
             raise EndOfFile
         if opcode == Opcode.MESSAGE:
             channel, sequence, stamp, publish_time = _MESSAGE.unpack_from(content, body)
-            if channels is None or channel in channels:
-                yield Message(channel, stamp, content[body + _MESSAGE.size : offset], publish_time, sequence)
+            yield Message(channel, stamp, content[body + _MESSAGE.size : offset], publish_time, sequence)
         elif opcode == Opcode.SCHEMA:
             yield Schema.read(ReadDataStream(BytesIO(content[body:offset])))
         elif opcode == Opcode.CHANNEL:
             yield Channel.read(ReadDataStream(BytesIO(content[body:offset])))
+
+
+def chunk_messages(content: bytes, channels: Collection[int]) -> list[tuple[int, bytes, int]]:
+    """Channel, data and sequence number of some channels' messages in a decompressed chunk, in order.
+
+    Raises one of UNREADABLE at a truncated record.
+    """
+    found, offset, end, message = [], 0, len(content), int(Opcode.MESSAGE)
+    record, start, data = _RECORD.unpack_from, _MESSAGE.unpack_from, _RECORD.size + _MESSAGE.size
+    while offset < end:
+        opcode, length = record(content, offset)
+        following = offset + _RECORD.size + length
+        if following > end:
+            raise EndOfFile
+        if opcode == message:
+            channel, sequence, _, _ = start(content, offset + _RECORD.size)
+            if channel in channels:
+                found.append((channel, content[offset + data : following], sequence))
+        offset = following
+    return found
 
 
 def file_number(stem: str) -> int:

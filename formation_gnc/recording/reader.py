@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from formation_gnc.errors import BagError, ConfigurationError
 from formation_gnc.flight import topics as run_topics
 from formation_gnc.recording.completeness import gaps, tick_of
-from formation_gnc.recording.contents import BagContents, BagMessage, own_type, unread_reason
+from formation_gnc.recording.contents import BagContents, own_type, unread_reason
 from formation_gnc.recording.decode import MessageType, installed_type
 from formation_gnc.recording.fields import Arrays, Fields
 from formation_gnc.recording.order import RunOrder, pacing_topic
 from formation_gnc.recording.provenance import IGNORED, LOST
-from formation_gnc.recording.stored_file import OWN_PACKAGE, type_of
+from formation_gnc.recording.stored_file import OWN_PACKAGE, BagMessage, type_of
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -1,6 +1,6 @@
 """Reader of one file of rosbag2's sqlite3 storage, through rosbags."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 
 from mcap.records import Channel, Schema
@@ -8,7 +8,7 @@ from rosbags.interfaces import Connection, ConnectionExtRosbag2, MessageDefiniti
 from rosbags.rosbag2 import Reader
 
 from formation_gnc.errors import BagError
-from formation_gnc.recording.stored_file import Series, Span, StoredFile
+from formation_gnc.recording.stored_file import Span, StoredFile
 
 _ENCODINGS = {
     MessageDefinitionFormat.MSG: "ros2msg",
@@ -36,7 +36,7 @@ class SqliteFile(StoredFile):
         except Exception as error:  # whatever its database library raises
             raise self._unreadable(error) from None
 
-    def _span_records(self, span: Span, channels: Mapping[int, Series]) -> Iterator[tuple[int, bytes, int]]:
+    def _span_records(self, span: Span, channels: Collection[int]) -> Iterator[tuple[int, bytes, int]]:
         try:
             with Reader(self.path) as reader:
                 wanted = [each for each in reader.connections if each.id in channels]

@@ -1,7 +1,7 @@
 """What every file of a bag offers, whatever its storage: its series of messages, in recorded order and by span."""
 
 from array import array
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -64,12 +64,12 @@ def type_of(series: Series) -> MessageType:
     return installed_type(series.type_name)
 
 
-class StoredMessage(NamedTuple):
-    """A message of a file."""
+class BagMessage(NamedTuple):
+    """A message of a bag."""
 
-    series: Series
+    topic: str
     row: int
-    """Its place among those of its series in the file."""
+    """Its place among those of its topic."""
     stamp: int
     """ns."""
     data: bytes
@@ -94,6 +94,7 @@ class _Stamps:
     """Stamps of one series in recorded order."""
 
     def __init__(self, series: Series) -> None:
+        self.topic = series.topic
         self.values = array("q")
         self.is_unsigned = False
         self.is_own = series.is_own
@@ -132,6 +133,17 @@ class _Stamps:
         values.append(stamp)
 
 
+@dataclass(slots=True)
+class _Cursor:
+    """Place in a series while a span is read."""
+
+    stamps: _Stamps
+    row: int
+    """Of the next message, in the file."""
+    offset: int
+    """Row in the bag of the file's first message."""
+
+
 class StoredFile:
     """One file of a bag, scanned when it is opened and read span by span in bounded memory.
 
@@ -166,25 +178,29 @@ class StoredFile:
         self._channels: dict[int, Series] = {}
         self._latest: tuple[int, int] | None = None  # stamp and log time of the run's latest message
 
-    def series_messages(self, span: Span, wanted: Collection[Series]) -> Iterator[StoredMessage]:
+    def messages(self, span: Span, wanted: Mapping[Series, int]) -> Iterator[BagMessage]:
         """Messages of some series in one span, in recorded order.
+
+        Args:
+            span: to read.
+            wanted: row of the file's first message of each series.
 
         Raises:
             BagError: the file is damaged.
         """
-        rows = dict(span.first)
-        series_of = {channel: series for channel, series in self._channels.items() if series in wanted}
-        for channel, data, sequence in self._span_records(span, series_of):
-            series = series_of[channel]
-            if not self._stamps[series].fits(data):
-                continue
-            row = rows[series] = rows.get(series, 0) + 1
-            stamps = self._stamps[series]
-            if row <= len(stamps.values):
-                stamp = stamps.values[row - 1]
-                yield StoredMessage(
-                    series, row - 1, stamp + 2**64 if stamps.is_unsigned and stamp < 0 else stamp, data, sequence
-                )
+        cursors = {
+            series: _Cursor(self._stamps[series], span.first.get(series, 0), wanted[series]) for series in wanted
+        }
+        cursor_of = {channel: cursors[series] for channel, series in self._channels.items() if series in wanted}
+        for channel, data, sequence in self._span_records(span, cursor_of):
+            cursor = cursor_of[channel]
+            stamps, row = cursor.stamps, cursor.row
+            if stamps.fits(data) and row < len(stamps.values):
+                cursor.row = row + 1
+                stamp = stamps.values[row]
+                if stamp < 0 and stamps.is_unsigned:
+                    stamp += 2**64
+                yield BagMessage(stamps.topic, cursor.offset + row, stamp, data, sequence)
 
     def stamps(self, series: Series) -> NDArray[np.int64]:
         """Stamps (ns) of a series in recorded order; uint64 when one is beyond 64 bits with sign."""
@@ -202,7 +218,7 @@ class StoredFile:
         """Messages of a series equal to one right before them."""
         return self._stamps[series].repeats if series in self._stamps else 0
 
-    def _span_records(self, span: Span, channels: Mapping[int, Series]) -> Iterator[tuple[int, bytes, int]]:
+    def _span_records(self, span: Span, channels: Collection[int]) -> Iterable[tuple[int, bytes, int]]:
         """Channel, data and sequence number of the messages of some channels in a span."""
         raise NotImplementedError
 
@@ -239,7 +255,10 @@ class StoredFile:
         elif self._latest is not None and self._latest[0] != self._latest[1]:
             stamp = self._latest[0]
         stamps.add(stamp, data)
-        span.start, span.end = min(span.start, stamp), max(span.end, stamp)
+        if stamp < span.start:
+            span.start = stamp
+        if stamp > span.end:
+            span.end = stamp
 
     @staticmethod
     def _header_stamp(data: bytes, log_time: int, is_own: bool) -> int:
