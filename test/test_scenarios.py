@@ -35,6 +35,16 @@ def test_every_scenario_replays_to_the_recorded_bits(
     assert min(counts[0][topic] for topic in every_tick) == TICKS
 
 
+@pytest.mark.thorough
+def test_a_flight_in_another_air_under_another_sky_replays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    models = ["drag=true", "density_model=nrlmsis", "sun=true", "moon=true", "ephemeris=de421"]
+    forces = [word for model in models for word in ("--set", f"plant.forces.{model}")]
+    bag = tmp_path / "bag"
+    assert main(["sil", "leader_follower", "--in-process", "--duration", "30", "--bag", str(bag), *forces]) == 0
+    assert main(["replay", str(bag), "--bag", str(tmp_path / "again")]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "identical on every GNC topic"
+
+
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_laws_with_quadratic_weights_have_those_of_lqr(name: str) -> None:
     """They are compared with one another: `verification/laws.py`."""

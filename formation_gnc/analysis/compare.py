@@ -54,6 +54,7 @@ def run_figures(bag: Bag) -> dict[str, dict[str, float | str]]:
     return table | {name: deputy.by_name() for name, deputy in result.deputies.items()}
 
 
+@np.errstate(all="ignore")  # what a bag holds may be as large as a float
 def draw_comparison(bags: Sequence[Bag], labels: Sequence[str], path: Path) -> None:
     """Draw errors, applied and commanded delta-v over time: a row per deputy, a curve per bag."""
     runs = [trajectories(bag) for bag in bags]

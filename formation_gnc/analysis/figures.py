@@ -64,6 +64,7 @@ class RunFigures:
         return max((each.verdict for each in self.deputies.values()), key=list(Verdict).index)
 
 
+@np.errstate(all="ignore")  # what a bag holds may be as large as a float
 def figures(bag: Bag) -> RunFigures:
     """Figures of a run.
 

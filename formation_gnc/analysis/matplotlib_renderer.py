@@ -2,9 +2,11 @@
 
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 
-from formation_gnc.analysis.plot import Axis, Curve, Plot, Style
+from formation_gnc.analysis.plot import Axis, Plot, Style
+from formation_gnc.types import Vector
 
 _LINES = {"solid": "-", "dashed": "--", "dotted": ":", "none": ""}
 _MARKERS = {"none": "", "dot": "o", "star": "*", "diamond": "D"}
@@ -14,6 +16,9 @@ LEGEND_Y = -0.16
 
 LEGEND_COLUMNS = 4
 
+FURTHEST = 1e30
+"""Largest coordinate that is drawn: the limits of an axis, and their squares, have to be numbers."""
+
 
 def draw(figure: Figure, place: Any, plot: Plot) -> None:
     """Draw a plot at a place of a figure, a `SubplotSpec`."""
@@ -21,11 +26,14 @@ def draw(figure: Figure, place: Any, plot: Plot) -> None:
     right = axes.twinx() if plot.right else None
     handles: dict[str, Any] = {}
     for curve in plot.curves:
-        if len(curve.x):
-            (handle,) = (right if curve.right and right else axes).plot(*_data(curve), **_look(curve.style))
+        data = _drawable(curve.x, curve.y, *(() if curve.z is None else (curve.z,)))
+        if data:
+            (handle,) = (right if curve.right and right else axes).plot(*data, **_look(curve.style))
             handles.setdefault(curve.label, handle)
     for track in plot.tracks:
-        (handles[track.label],) = axes.plot(*track.position[-1:].T, **_look(track.style))
+        data = _drawable(*track.position[-1:].T)
+        if data:
+            (handles[track.label],) = axes.plot(*data, **_look(track.style))
     axes.set(title=plot.title)
     _set_axis(axes, "x", plot.x)
     _set_axis(axes, "y", plot.y)
@@ -42,8 +50,10 @@ def draw(figure: Figure, place: Any, plot: Plot) -> None:
     axes.grid(alpha=0.3)
 
 
-def _data(curve: Curve) -> tuple[Any, ...]:
-    return (curve.x, curve.y) if curve.z is None else (curve.x, curve.y, curve.z)
+def _drawable(*coordinates: Vector) -> tuple[Vector, ...]:
+    """Coordinates with gaps where Matplotlib has no place for a point; none when it has for no point at all."""
+    fits = np.all([np.abs(each) < FURTHEST for each in coordinates], axis=0)  # not a number: false
+    return tuple(np.where(fits, each, np.nan) for each in coordinates) if fits.any() else ()
 
 
 def _look(style: Style) -> dict[str, Any]:

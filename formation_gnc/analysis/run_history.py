@@ -34,6 +34,7 @@ class RunHistory:
         BagError: the bag has no truth, or lacks a field.
     """
 
+    @np.errstate(all="ignore")  # what a bag holds may be as large as a float
     def __init__(self, bag: Bag) -> None:
         """Read the bag once."""
         names = deputies_of(bag)

@@ -54,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _is_read(bag: Bag, topic: str) -> bool:
-    """Whether a topic can be decoded; says why not."""
+    """Whether a topic can be decoded; prints the reason if not."""
     reason = bag.unread_reason(topic)
     if reason:
         print(f"skipped: {topic}: {reason}")

@@ -34,7 +34,7 @@ LOST_STATUS = 3
 """Exit status of a run whose formation is lost."""
 
 PATIENCE = 3.0
-"""Wall time (s) between lines that say what the run waits for."""
+"""Wall time (s) between lines about what the run waits for."""
 
 COLUMNS = 2
 """Deputies beyond which the summary has a row, not a column, for each."""

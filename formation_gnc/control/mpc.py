@@ -64,6 +64,7 @@ class MpcParameters(QuadraticWeights):
     )
     total_thrust: float = parameter(
         0.0,
+        follows="{deputy}.thrusters.total_limit",
         unit="N",
         minimum=0.0,
         in_flight=True,
@@ -82,6 +83,7 @@ class MpcParameters(QuadraticWeights):
     keep_out_chief: bool = parameter(True, in_flight=True, doc="whether the chief has a keep-out sphere too")
     off_in_eclipse: bool = parameter(
         False,
+        follows="{deputy}.thrusters.off_in_eclipse",
         in_flight=True,
         doc="no thrust in the eclipses that the target predicts, nor in a step of the plan that meets one",
     )

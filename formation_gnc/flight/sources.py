@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass
 class _Stream:
-    """Messages of one publisher: the last stamp (ns) and number that were heard of it."""
+    """Messages of one publisher: the last stamp (ns) and number received from it."""
 
     stamp: int
     number: int | None
@@ -18,7 +18,7 @@ class _Stream:
 
 
 class SourceLock:
-    """Keeps a reader to the publisher that it hears, where others publish the topic too.
+    """Keeps a reader to one publisher where others publish the topic too.
 
     A message does not carry its publisher, but each publisher numbers its own. While a topic has one publisher, every
     message counts, as those of a new run do; while it has several, only what leads on from the last that counted,
@@ -38,7 +38,7 @@ class SourceLock:
         Args:
             stamp: ns.
             number: its publisher's sequence number; None where the middleware has none.
-            is_shared: whether the topic has several publishers; asked only where the numbers do not tell.
+            is_shared: whether the topic has several publishers; asked only where the numbers do not decide.
         """
         follows = self._heard is None or self._heard.leads_to(stamp, number)
         others = [each for each in self._others if number is not None and each.leads_to(stamp, number)]

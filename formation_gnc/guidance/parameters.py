@@ -28,7 +28,7 @@ class GuidanceParameters(ModuleParameters):
         maximum=LAST_SECOND,
         in_flight=True,
         doc="time allowed for reaching a changed target, during which no other change of target is accepted; "
-        "an event says when the thrusters need longer; 0 for no limit",
+        "an event warns when the thrusters need longer; 0 for no limit",
     )
     fleet: tuple[str, ...] = parameter(
         (),

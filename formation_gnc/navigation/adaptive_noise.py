@@ -154,6 +154,8 @@ class AdaptiveNoise:
         """Every sensor as its parameter says."""
         self._sensors: dict[str, _SensorNoise] = {}
         self._noisy: dict[str, float] = {}
+        self._reported: set[str] = set()
+        """Sensors whose latest report is that they are noisy."""
         self._contributions = np.zeros((0, 6, 6))
         """(s, 6, 6) of the recent readings of each sensor to the covariance after the last update."""
         self._transition = np.eye(6)
@@ -275,7 +277,7 @@ class AdaptiveNoise:
 
     def take_reports(self) -> list[tuple[str, str]]:
         """Subject and detail of each change of a sensor's noise that is worth an event."""
-        if not self._noisy and all(sensor.reported == 1.0 for sensor in self._sensors.values()):
+        if not (self._noisy or self._reported):
             return []
         reports = []
         for name, sensor in self._sensors.items():
@@ -284,6 +286,7 @@ class AdaptiveNoise:
             if is_new or max(sigma / sensor.reported, sensor.reported / sigma) > REPORTED_AGAIN:
                 sensor.reported = sigma
                 is_noisy = sigma > 1.0
+                (self._reported.add if is_noisy else self._reported.discard)(name)
                 detail = f"noise {sigma:.2g} times {name}_sigma: weighted so" if is_noisy else "noise as assumed again"
                 reports.append((name, detail))
         return reports

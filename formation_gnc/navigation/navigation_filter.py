@@ -116,7 +116,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         return estimate
 
     def _warn_of_sensors(self, state: FilterState, time: int) -> None:
-        """Log sensors that are noisier than their parameters say, or silent."""
+        """Log sensors that are noisier than their parameters, or silent."""
         after = round(SILENT_AFTER * self.parameters.coasting_after * NANOSECONDS)
         silences = state.checks.take_silences(self.configuration.design.variance, state.start, time, after)
         for subject, detail in state.noise.take_reports() + silences:

@@ -57,10 +57,10 @@ class PlantNode(ConfiguredNode):
         """Whether the recorder, whatever its name, has subscribed to every topic of the run."""
         for recorder in self.get_publishers_info_by_topic(self.full_name(topics.PROGRESS.name)):
             try:
-                heard = self.get_subscriber_names_and_types_by_node(recorder.node_name, recorder.node_namespace)
+                subscribed = self.get_subscriber_names_and_types_by_node(recorder.node_name, recorder.node_namespace)
             except NodeNameNonExistentError:
                 continue
-            if dict(heard).keys() >= self._recorded_topics:
+            if dict(subscribed).keys() >= self._recorded_topics:
                 return True
         return False
 

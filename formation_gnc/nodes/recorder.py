@@ -30,8 +30,7 @@ LOOK_PERIOD = 0.1
 """Wall time (s) between looks for new topics and nodes, and between reports of progress."""
 
 QUIET = 0.2
-"""Wall time (s) that a recorder which is told to stop listens without a message before it believes that all
-has come. Listening counts: without processor time nothing is heard either."""
+"""Wall time (s) without a message, while spinning, after which a stopping recorder has drained its queues."""
 
 
 class RecorderNode(ConfiguredNode):
@@ -100,7 +99,7 @@ class RecorderNode(ConfiguredNode):
 
 
 def record(node: RecorderNode) -> None:
-    """Record until told to stop, and then until nothing more comes; raises OSError when the disk fails."""
+    """Record until a stop is requested and the queues are drained; raises OSError when the disk fails."""
     session = node.session
     try:
         node.spin(lambda: stop_requested() or session.failure is not None)

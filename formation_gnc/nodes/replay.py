@@ -60,7 +60,7 @@ class ReplayNode(ConfiguredNode):
         return bool(self.count_publishers(self.full_name(topic)))
 
     def check(self) -> bool:
-        """Play what is due, and say whether that was all."""
+        """Play what is due; returns whether the end is reached."""
         for _ in range(BURST):
             before = self.player.stamp
             given_up = self.player.advance_if_due(monotonic(), self._is_published)
@@ -98,7 +98,7 @@ class ReplayNode(ConfiguredNode):
 
 
 def play(node: ReplayNode) -> None:
-    """Play to the end, or until told to stop."""
+    """Play to the end, or until a stop is requested."""
     node.spin(lambda: stop_requested() or node.check(), lambda: CHECK_PERIOD)
 
 

@@ -100,7 +100,7 @@ def _decompressed(data: bytes) -> bytes:
 
 
 def _metadata(path: Path) -> dict[str, Any]:
-    """What the bag's metadata.yaml says; empty where there is none that can be read."""
+    """Contents of the bag's metadata.yaml; empty where there is none that can be read."""
     try:
         document = yaml.safe_load((path / "metadata.yaml").read_text(encoding="utf-8"))
     except (OSError, ValueError, yaml.YAMLError):

@@ -66,7 +66,7 @@ def is_free(topic: str) -> bool:
 
 
 def pacing_topic(counts: Mapping[str, int]) -> str:
-    """Topic that tells runs apart, of those with messages: the truth, else the fullest that is not the clock."""
+    """Topic by which runs are separated, of those with messages: the truth, else the fullest that is not the clock."""
     usable = {topic: n for topic, n in counts.items() if n and not is_free(topic) and topic != topics.CLOCK.name}
     if topics.TRUTH.name in usable:
         return topics.TRUTH.name

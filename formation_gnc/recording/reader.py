@@ -108,7 +108,7 @@ class Bag:
 
     @property
     def are_told_apart(self) -> bool:
-        """Whether runs, where there are several, can be told apart."""
+        """Whether runs, where there are several, can be separated."""
         return self._error is None
 
     def runs(self) -> "list[Bag]":

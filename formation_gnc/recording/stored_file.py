@@ -110,7 +110,7 @@ class _Stamps:
         self.has_header = self._kind is not None and self._kind.is_stamped
 
     def fits(self, data: bytes) -> bool:
-        """Whether a message is one of the type, as far as its length tells once one of that length was."""
+        """Whether a message is one of the type; once one of its length is, all of that length count as such."""
         if self._kind is None:
             return True
         key = data[:2], len(data)

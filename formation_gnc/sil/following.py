@@ -1,4 +1,4 @@
-"""Parameters that follow the plant's: what stands in its section holds for every node that is not told otherwise.
+"""Parameters that follow the plant's: its values hold for every node that is not given others.
 
 The plant's parameter that another one follows is named in its :class:`~formation_gnc.parameters.Limits`:
 

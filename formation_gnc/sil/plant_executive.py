@@ -105,7 +105,7 @@ class PlantExecutive:
             self.advance_if_ready(now)
 
     def advance_if_ready(self, now: float) -> None:
-        """Fly the tick if the barrier says that it is over."""
+        """Fly the tick if the barrier lets it end."""
         if self.finished:
             return
         decision = self.simulation.advance_if_ready(now, self._publish, self._absent)

@@ -152,7 +152,7 @@ def _note_restarts(
 
 @dataclass
 class _RecordedTick:
-    """Recorded messages of one stamp by topic, and what they say of the replayed modules."""
+    """Recorded messages of one stamp by topic, and what they contain of the replayed modules."""
 
     stamp: int
     messages: dict[str, list[bytes]] = field(default_factory=dict)

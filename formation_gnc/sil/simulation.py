@@ -56,7 +56,7 @@ class Simulation:
                 yield row.answer.of(deputy), row.name
 
     def open_tick(self, now: float, publish: Sink) -> None:
-        """Publish what the plant has to say at the current tick; measurements first, since everybody waits for them."""
+        """Publish the plant's records of the current tick; measurements first, since all modules wait for them."""
         plant = self.plant
         self.barrier.open(plant.time, now)
         for name, measurement in plant.measure().items():

@@ -93,7 +93,7 @@ def fly_graph(
         scenario: what to fly.
         options: how.
         show: called with the run's reports.
-        announce: called once with a line that says where the graph can be watched.
+        announce: called once with a line that names the ROS domain of the graph.
 
     Returns:
         The last report of the plant.

@@ -146,7 +146,7 @@ class ModuleNode(ConfiguredNode):
                 self.show_parameters(dump(self._module.parameters))
 
     def _diagnose(self) -> None:
-        """Publish whether it answers, and what has happened since it was last told."""
+        """Publish whether the module answers, and its events since the last diagnostics."""
         level, message = DiagnosticStatus.OK, "answering"
         ignored = [topic for topic, lock in self._locks.items() if lock.ignored]
         if not self._answered:

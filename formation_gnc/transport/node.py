@@ -171,7 +171,7 @@ class ConfiguredNode(Node):  # type: ignore[misc]
     def subscribe_to_source(
         self, record: type, topic: str, callback: Callable[[bytes, Information], object], depth: int = QUEUE_DEPTH
     ) -> SourceLock:
-        """As `subscribe`; where several nodes publish the topic, to the one that is heard (:class:`SourceLock`).
+        """As `subscribe`; where several nodes publish the topic, to the first one only (:class:`SourceLock`).
 
         depth: all share it, so that a burst of other nodes' messages must not push out the one that is awaited.
         """
@@ -204,13 +204,13 @@ class ConfiguredNode(Node):  # type: ignore[misc]
             self.get_logger().info(str(event))
 
     def create_wall_timer(self, period: float, callback: Callable[[], None]) -> Timer:
-        """A timer on wall time, whatever `use_sim_time` says: simulated time stands still while a node waits."""
+        """A timer on wall time, whatever `use_sim_time` is: simulated time stands still while a node waits."""
         return self.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def spin(
         self, ended: Callable[[], bool] = stop_requested, period: Callable[[], float] = lambda: CHECK_PERIOD
     ) -> None:
-        """Serve callbacks until `ended` says so, which is asked every `period` (s)."""
+        """Serve callbacks until `ended`, checked every `period` (s), returns true."""
         if self._served_by is None:
             serve(self)
         while not ended():

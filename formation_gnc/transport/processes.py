@@ -85,7 +85,7 @@ class Graph:
                 raise NodeDied(f"{node.name} ended: {node.reason()}")
 
     def stop(self) -> None:
-        """Stop every node, the recorder last, since it hears the others out; by force what does not stop."""
+        """Stop every node, the recorder last, after its queues are drained; kill what does not stop."""
         for kind in (False, True):
             group = [node for node in self.nodes if node.name.endswith("/recorder") is kind]
             _signal(group, signal.SIGINT)

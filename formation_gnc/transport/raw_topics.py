@@ -47,7 +47,7 @@ class RawTopics:
         self._time = 0
 
     def look(self) -> None:
-        """Subscribe to the topics that have appeared since, and again where a writer is not heard."""
+        """Subscribe to the topics that have appeared since, and again where a writer is not matched."""
         for topic in list(self._unheard):
             self._subscribe_to_offers(topic)
         self._unheard.clear()
@@ -92,7 +92,7 @@ class RawTopics:
         return topic.removeprefix(formation) if formation == self._formation else None
 
     def _offered(self, topic: str) -> QoSProfile:
-        """The most demanding quality of service that hears every writer there is."""
+        """The most demanding quality of service that matches every present writer."""
         qos = quality()
         for offer in (each.qos_profile for each in self._node.get_publishers_info_by_topic(topic)):
             if offer.durability == QoSDurabilityPolicy.VOLATILE:

@@ -1,4 +1,4 @@
-"""Subscriptions that hear every writer, whatever quality of service it offers."""
+"""Subscriptions that match every writer, whatever quality of service it offers."""
 
 import struct
 from collections.abc import Callable, Iterable
@@ -61,6 +61,6 @@ def names(endpoints: Iterable[TopicEndpointInfo]) -> list[str]:
 
 
 def first_stamp(data: bytes) -> int:
-    """The stamp that a message begins with, in ns: after four bytes that tell how it is encoded."""
+    """The stamp that a message begins with, in ns: after the four bytes of the encapsulation."""
     seconds, nanoseconds = struct.unpack_from("<iI", data, 4)
     return int(seconds * NANOSECONDS + nanoseconds)

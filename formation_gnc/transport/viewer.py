@@ -18,7 +18,7 @@ LOOK_PERIOD = 0.5
 
 
 def show_graph(view: LiveView, ended: Callable[[], bool]) -> None:
-    """Pass everything said in this ROS domain on to a view until `ended` says so."""
+    """Forward every message of this ROS domain to a view until `ended` returns true."""
     context = Context()
     rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("view", context=context, start_parameter_services=False)

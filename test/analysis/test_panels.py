@@ -5,13 +5,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from formation_gnc.analysis import overview
 from formation_gnc.analysis.deputy_history import DeputyHistory
+from formation_gnc.analysis.matplotlib_renderer import draw
 from formation_gnc.analysis.overview import draw_overview, draw_panels
 from formation_gnc.analysis.panels.panel import DeputyPanel, FleetPanel
 from formation_gnc.analysis.panels.registry import DEPUTY_PANELS, FLEET_PANELS
-from formation_gnc.analysis.plot import TIME, Axis, Curve, Plot
+from formation_gnc.analysis.plot import TIME, Axis, Curve, Plot, Track
 from formation_gnc.analysis.report import write_report
 from formation_gnc.analysis.run_history import RunHistory
 from formation_gnc.recording.reader import Bag
@@ -83,6 +85,22 @@ def test_curves_of_a_panel_are_numbers_of_equal_length(panel: DeputyPanel, fleet
             assert curve.x.shape == curve.y.shape
             assert np.isfinite(curve.x).all()
             assert np.isfinite(curve.y).all()
+
+
+@pytest.mark.parametrize("rows", [slice(1, 3), slice(-1, None), slice(None)], ids=["inner", "last", "all"])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e308])
+def test_a_picture_leaves_out_points_it_has_no_place_for(value: float, rows: slice, tmp_path: Path) -> None:
+    good, bad = np.linspace(0.0, 1.0, 5), np.linspace(0.0, 1.0, 5)
+    bad[rows] = value
+    axis = Axis("toy", "m")
+    tracks = [Track("now", good, np.column_stack((good, bad, good)))]
+    space = Plot("space", axis, axis, [Curve("path", bad, good, z=good)], z=axis, equal=True, tracks=tracks)
+    plane = Plot("plane", axis, axis, [Curve("path", good, bad), Curve("whole", good, good)], equal=True)
+    figure = Figure()
+    grid = figure.add_gridspec(1, 2)
+    for column, plot in enumerate((space, plane)):
+        draw(figure, grid[0, column], plot)
+    figure.savefig(tmp_path / "picture.png")
 
 
 def test_every_panel_has_a_name_of_its_own() -> None:

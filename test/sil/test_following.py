@@ -48,6 +48,8 @@ def test_modules_take_what_the_plant_says_of_their_deputy() -> None:
         "epoch": 1e8,  # which the file gives nobody
         "deputy1.mass": 80,
         "deputy1.thrusters.limit": [0.02, 0.03, 0.0],
+        "deputy1.thrusters.total_limit": 0.03,
+        "deputy1.thrusters.off_in_eclipse": True,
         "deputy1.sensors.radius.sigma": 12.0,
         "deputy1.sensors.latitude.on": False,
         "deputy1.sensors.chief_range.on": True,
@@ -62,6 +64,7 @@ def test_modules_take_what_the_plant_says_of_their_deputy() -> None:
     assert navigation.fix_velocity_sigma == 0.01
     assert (controller.mass, controller.thrust_limit) == (80.0, (0.02, 0.03, 0.0))
     assert guidance.thrust_limit == (0.02, 0.03, 0.0)
+    assert (controller.laws["mpc"].total_thrust, controller.laws["mpc"].off_in_eclipse) == (0.03, True)
     assert scenario.departures() == []
 
 
