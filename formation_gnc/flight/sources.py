@@ -4,6 +4,9 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+UNKNOWN = "_NODE_NAME_UNKNOWN_"
+"""In the place of a publisher's name, as ROS has it, until the middleware knows it."""
+
 
 @dataclass
 class _Stream:
@@ -22,7 +25,8 @@ class SourceLock:
 
     A message does not carry its publisher, but each publisher numbers its own. While a topic has one publisher, every
     message counts, as those of a new run do; while it has several, only what leads on from the last that counted,
-    and not from what others have published.
+    and not from what others have published. The name of a publisher may be known later than its first messages:
+    they count, as those of a node that was started again, until the publisher before goes on.
     """
 
     def __init__(self) -> None:
@@ -30,6 +34,8 @@ class SourceLock:
         self.ignored = 0
         """Messages that did not count."""
         self._heard: _Stream | None = None
+        self._before: _Stream | None = None
+        """The one before, which has ended if the one that counts is the same node started again."""
         self._others: list[_Stream] = []
 
     def accepts(self, stamp: int, number: int | None, is_shared: Callable[[], bool]) -> bool:
@@ -40,8 +46,13 @@ class SourceLock:
             number: its publisher's sequence number; None where the middleware has none.
             is_shared: whether the topic has several publishers; asked only where the numbers do not decide.
         """
-        follows = self._heard is None or self._heard.leads_to(stamp, number)
+        heard = self._heard
+        follows = heard is None or heard.leads_to(stamp, number)
         others = [each for each in self._others if number is not None and each.leads_to(stamp, number)]
+        if not follows and heard and self._before and number is not None and self._before.leads_to(stamp, number):
+            self._others.append(heard)  # a stranger, whose name was not known yet
+            self._heard, self._before = _Stream(stamp, number), None
+            return True
         if others and (not follows or is_shared()):
             others[0].stamp, others[0].number = stamp, number
             self.ignored += 1
@@ -52,6 +63,7 @@ class SourceLock:
             return False
         if not follows:
             self._others.clear()
+            self._before = heard
         self._heard = _Stream(stamp, number)
         return True
 
@@ -63,8 +75,11 @@ def names_of(publishers: Sequence[str]) -> str:
 
 
 def is_shared(publishers: Sequence[str]) -> bool:
-    """Whether nodes of different names publish a topic; one that is started again may be listed twice for a while."""
-    return len(set(publishers)) > 1
+    """Whether nodes of different names publish a topic.
+
+    One that is started again may be listed twice for a while, and at first without its name.
+    """
+    return len({each for each in publishers if UNKNOWN not in each}) > 1
 
 
 def shared(topics: Sequence[str], publishers_of: Callable[[str], Sequence[str]]) -> Iterator[tuple[str, str]]:

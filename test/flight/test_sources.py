@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from formation_gnc.flight.sources import SourceLock, is_shared, names_of, shared
+from formation_gnc.flight.sources import UNKNOWN, SourceLock, is_shared, names_of, shared
 
 TICK = 10**9
 
@@ -54,6 +54,26 @@ def test_one_that_is_started_again_counts_when_the_others_have_gone() -> None:
         assert lock.accepts(tick * TICK, tick + 1, lambda: False)
     for tick in range(3, 6):
         assert lock.accepts(tick * TICK, tick + 1, lambda: True)
+
+
+def test_a_node_started_again_counts_before_its_name_is_known() -> None:
+    lock = flown(5)
+    for tick, second in (
+        (9, f"/{UNKNOWN}"),
+        (10, f"/{UNKNOWN}"),
+        (11, "/deputy1/navigation"),
+        (12, "/deputy1/navigation"),
+    ):
+        assert lock.accepts(tick * TICK, tick - 8, lambda second=second: is_shared(["/deputy1/navigation", second]))
+    assert lock.ignored == 0
+
+
+def test_a_stranger_without_a_name_yet_does_not_take_over() -> None:
+    lock = flown(5)
+    assert lock.accepts(90 * TICK, 1, lambda: is_shared(["/plant", f"/{UNKNOWN}"])), "as a plant that is started again"
+    for tick in range(5, 9):
+        assert lock.accepts(tick * TICK, tick + 1, lambda: True)
+        assert not lock.accepts((86 + tick) * TICK, tick - 3, lambda: True)
 
 
 def test_the_graph_is_asked_only_about_what_does_not_follow() -> None:
