@@ -14,6 +14,7 @@ from formation_gnc.recording.files import COMPRESSED, bag_files, missing_files, 
 from formation_gnc.recording.mcap_file import verified_summary
 from formation_gnc.recording.salvage import Group, SalvageReader
 from formation_gnc.recording.sqlite_salvage import SqliteSalvage
+from formation_gnc.recording.stored_file import Series, type_of
 from formation_gnc.recording.topic_definition import TopicDefinition
 from formation_gnc.recording.writer import BagWriter
 
@@ -42,7 +43,8 @@ def recover(path: Path, output: Path) -> Recovery:
     """Write everything that is readable in a bag into a new bag with an index.
 
     A bag that is whole is left alone. From a chunk whose checksum is wrong, messages are saved as far as the
-    chunk can be unpacked; `reasons` says so. The new bag's metadata record "recovery" repeats what was lost.
+    chunk can be unpacked, and they can be decoded; `reasons` says so. The new bag's metadata record "recovery"
+    repeats what was lost.
 
     Args:
         path: bag directory, .mcap or .db3 file.
@@ -93,6 +95,21 @@ class _Survey:
             elif isinstance(record, Channel):
                 self.channels.setdefault(record.id, record)
 
+    def sound(self, group: Group) -> Iterator[Message]:
+        """Messages of a group that can be decoded, or whose type cannot be."""
+        return (item for item in group.records if isinstance(item, Message) and not self._is_misfit(item))
+
+    def _is_misfit(self, message: Message) -> bool:
+        channel = self.channels.get(message.channel_id)
+        schema = self.schemas.get(channel.schema_id) if channel else None
+        if channel is None or schema is None:
+            return False
+        try:
+            kind = type_of(Series(channel.topic, schema.name, schema.data, schema.encoding, channel.message_encoding))
+        except BagError:
+            return False
+        return not kind.fits(message.data)
+
     def count(self, found: Counter[int], missing: Counter[int]) -> None:
         """Count as saved or lost what was found or is missing, by channel."""
         for channel_id, count in (+missing).items():
@@ -115,6 +132,7 @@ def _surveyed(path: Path) -> _Survey:
     """Read a file once, without keeping its messages."""
     survey = _Survey(path)
     found: Counter[int] = Counter()
+    sound: Counter[int] = Counter()
     missing: Counter[int] = Counter()
     from_damaged: Counter[int] | None = None  # messages found in the chunk before, if that is damaged
     if path.suffix == COMPRESSED:
@@ -127,10 +145,11 @@ def _surveyed(path: Path) -> _Survey:
         for record in reader.records():
             match record:
                 case Group():
-                    counts = Counter(item.channel_id for item in record.records if isinstance(item, Message))
-                    found.update(counts)
-                    from_damaged = counts if record.damaged else None
                     survey.add_definitions(record)
+                    counts = Counter(item.channel_id for item in survey.sound(record))
+                    sound.update(counts)
+                    found.update(item.channel_id for item in record.records if isinstance(item, Message))
+                    from_damaged = counts if record.damaged else None
                 case MessageIndex() if from_damaged is not None:
                     missing[record.channel_id] += len(record.records) - from_damaged[record.channel_id]
                 case Metadata():
@@ -139,6 +158,7 @@ def _surveyed(path: Path) -> _Survey:
                     survey.attachments[record.name] = record.data
         survey.reasons = reader.reasons
         survey.indexed = (summary is not None or isinstance(reader, SqliteSalvage)) and not reader.has_wrong_lengths
+    found = sound if survey.reasons else found  # what does not fit its type in a whole file was recorded so
     survey.count(found, _missing(summary, found, missing))
     return survey
 
@@ -183,7 +203,9 @@ def _write(surveys: list[_Survey], output: Path, report: dict[str, str], unpack:
 def _copy_messages(survey: _Survey, writer: BagWriter, unpack: Unpack) -> None:
     with survey.path.open("rb") as stream:
         for record in _reader(survey.path, stream).records():
-            for item in record.records if isinstance(record, Group) else ():
+            if not isinstance(record, Group):
+                continue
+            for item in survey.sound(record) if survey.reasons else record.records:
                 if isinstance(item, Message) and item.channel_id in survey.saved:
                     topic = survey.channels[item.channel_id].topic
                     writer.write(topic, unpack(item.data), item.log_time, item.sequence)
