@@ -129,7 +129,7 @@ def _reader(path: Path, stream: BinaryIO) -> SalvageReader | SqliteSalvage:
 
 
 def _surveyed(path: Path) -> _Survey:
-    """Read a file once, without keeping its messages."""
+    """Read a file, without keeping its messages."""
     survey = _Survey(path)
     found: Counter[int] = Counter()
     sound: Counter[int] = Counter()
@@ -141,6 +141,10 @@ def _surveyed(path: Path) -> _Survey:
         summary = verified_summary(stream)
         if summary is not None:
             survey.schemas, survey.channels = summary.schemas, summary.channels
+        else:  # definitions may stand behind their messages
+            for record in _reader(path, stream).records():
+                if isinstance(record, Group):
+                    survey.add_definitions(record)
         reader = _reader(path, stream)
         for record in reader.records():
             match record:
