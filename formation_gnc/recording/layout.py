@@ -99,20 +99,22 @@ def _deputy_tab(panels: _Panels, name: str) -> Any:
 
 
 def _run_column(panels: _Panels) -> Any:
-    """Scene, state, events and log of the whole run."""
-    scene = panels.add(
-        "3D",
-        "scene",
-        foxglovePanelTitle="Hill frame, drawn by the display node",
-        followTf="hill",
-        followMode="follow-pose",
-        topics={topics.MARKERS.name: {"visible": True}},
-        cameraState={"distance": 2000.0, "phi": 60.0, "thetaOffset": 45.0, "perspective": True, "fovy": 45.0},
-    )
+    """Formation, state, events and log of the whole run, from topics that every bag has: markers need the display."""
+    states = f"{topics.TRUTH.name}.deputies[:].relative_state"
+    views = [
+        panels.add_plot(
+            f"formation-{index}",
+            f"Formation now: {axis} over along-track [m]",
+            {axis: f"{states}[{index}]"},
+            xAxisVal="currentCustom",
+            xAxisPath={"value": f"{states}[1]", "enabled": True},
+        )
+        for index, axis in ((0, "radial"), (2, "cross-track"))
+    ]
     state = panels.add("DiagnosticSummary", "run", foxglovePanelTitle="Run", topicToRender=topics.DIAGNOSTICS.name)
     events = panels.add("RawMessages", "events", foxglovePanelTitle="Events", topicPath=topics.EVENTS.name)
     log = panels.add("RosOut", "rosout", foxglovePanelTitle="Log of the nodes")
-    return _stacked("column", [scene, state, events, log])
+    return _stacked("column", [*views, state, events, log])
 
 
 def _stacked(direction: str, items: Sequence[Any]) -> Any:

@@ -82,10 +82,14 @@ class ReplayedModule:
 def parameters_of(bag: Bag, node: str, start: int | None = None) -> dict[str, Any]:
     """Parameters that a node was started with, as the bag has them; empty when it has none.
 
-    start: stamp (ns) of its first answer after it had been started again; None for its first start.
+    start: stamp (ns) of its first answer after it had been started again; None for its first start. Raises
+    ConfigurationError for values that are no JSON.
     """
     recorded = bag.metadata.get(parameters_record(node, start), {})
-    return {name: json.loads(text) for name, text in recorded.items() if not name.startswith(OWN_OF_ROS)}
+    try:
+        return {name: json.loads(text) for name, text in recorded.items() if not name.startswith(OWN_OF_ROS)}
+    except ValueError as error:
+        raise ConfigurationError(f"{bag.path}: recorded parameters of {node} are no JSON ({error})") from None
 
 
 def nodes_of(bag: Bag, modules: Sequence[str]) -> list[str]:
