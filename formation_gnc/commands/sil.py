@@ -22,6 +22,7 @@ from formation_gnc.control.registry import ALGORITHMS
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.plant.plant import Plant
 from formation_gnc.sil.overrides import overrides_of
+from formation_gnc.sil.path_demand import path_demand_warnings
 from formation_gnc.sil.process_noise import process_noise_warnings
 from formation_gnc.sil.recovery_forecast import recovery_warnings
 from formation_gnc.sil.runner import Run
@@ -88,7 +89,13 @@ def run(options: argparse.Namespace) -> int:
     Plant(scenario.plant)  # rejects what cannot be flown, before any warning
     console = Console(stderr=True, highlight=False)
     ignored = [f"parameter {name}, given to all nodes: ignored, since none has it" for name in scenario.ignored]
-    noted = [*ignored, *scenario.departures(), *process_noise_warnings(scenario), *recovery_warnings(scenario)]
+    noted = [
+        *ignored,
+        *scenario.departures(),
+        *process_noise_warnings(scenario),
+        *path_demand_warnings(scenario),
+        *recovery_warnings(scenario),
+    ]
     for warning in noted:
         console.print(f"warning: {warning}", soft_wrap=True)
     on_graph = partial(_fly_on_graph, composed=options.composed, display=options.display)
