@@ -140,9 +140,7 @@ def test_outliers_err_by_their_size_to_either_side(fly: Fly) -> None:
 def test_swapped_sensors_exchange_their_values(fly: Fly) -> None:
     clean, faulty = fly().readings(), fly(entry("swap")).readings()
     for sensor, other in (("radius", "latitude"), ("latitude", "radius")):
-        assert faulty[sensor] == {
-            tick: clean[other if BEGIN <= tick < END else sensor][tick] for tick in clean[sensor]
-        }
+        assert faulty[sensor] == {tick: clean[other if BEGIN <= tick < END else sensor][tick] for tick in clean[sensor]}
 
 
 def test_sensors_of_different_intervals_are_swapped_with_their_times(fly: Fly) -> None:
