@@ -105,7 +105,7 @@ class Plant:
             satellite.eclipse = self._propagator.illumination(seconds, state) < 1.0
             missed = satellite.missed
             # Positional: keyword arguments take twice as long.
-            measurements[satellite.name] = Measurement(
+            measurement = Measurement(
                 self.time,
                 satellite.name,
                 chief,
@@ -116,8 +116,9 @@ class Plant:
                 missed,
                 satellite.sensors.fix(relative_from_inertial(chief, state)) if missed else NO_FIX,
             )
+            measurements[satellite.name] = measurement
             if satellite.faults is not None:
-                satellite.faults.tell(measurements[satellite.name])
+                satellite.faults.tell(measurement)
         return measurements
 
     def truth(self) -> Truth:
@@ -157,11 +158,12 @@ class Plant:
         for satellite in self._satellites:
             command = forces.get(satellite.name)
             masses.append(satellite.state.mass)
-            fired = NO_FORCE if command is None else command.tolist(), satellite.eclipse, satellite.state
-            if satellite.faults is None:
-                force, satellite.state, denied = satellite.thruster.apply(*fired)
-            else:
-                force, satellite.state, denied = satellite.faults.fire(satellite.thruster, *fired, self.time)
+            commanded = NO_FORCE if command is None else command.tolist()
+            force, satellite.state, denied = (
+                satellite.thruster.apply(commanded, satellite.eclipse, satellite.state)
+                if satellite.faults is None
+                else satellite.faults.fire(satellite.thruster, commanded, satellite.eclipse, satellite.state, self.time)
+            )
             applied.append(force)
             satellite.missed = command is None or Denial.NOT_FINITE in denied
             if satellite.missed:

@@ -87,8 +87,8 @@ class _Instrument:
         self.faults: SatelliteFaults | None = None
         self._in_transit: list[tuple[int, Reading]] = []
 
-    def read(self, tick: int, deputy: list[float], chief: list[float], outage: bool) -> Iterator[Reading]:
-        """Take the reading that is due at a tick; yields those that arrive at it."""
+    def read(self, tick: int, deputy: list[float], chief: list[float], outage: bool, arrived: list[Reading]) -> None:
+        """Take the reading that is due at a tick; adds those that arrive at it to others."""
         if tick % self._interval == 0:
             # Drawn even when unused: switching one error on leaves the others as they were.
             noise, (dropped, stray, side) = next(self._draws)
@@ -104,7 +104,7 @@ class _Instrument:
                 else:
                     self._read_with(self.faults, tick, values, noise)
         while self._in_transit and self._in_transit[0][0] == tick:
-            yield self._in_transit.pop(0)[1]
+            arrived.append(self._in_transit.pop(0)[1])
 
     def _read_with(self, faults: SatelliteFaults, tick: int, values: list[float], noise: list[float]) -> None:
         random = [sigma * each for sigma, each in zip(self._sigma, noise, strict=True)]
@@ -159,8 +159,10 @@ class Sensors:
         if not self._instruments or tick % self._beat:
             return []
         outage = self._outage[0] <= tick * self._tick_ns / NANOSECONDS < self._outage[1]
-        states = deputy.tolist(), chief.tolist()
-        return [reading for instrument in self._instruments for reading in instrument.read(tick, *states, outage)]
+        states, arrived = (deputy.tolist(), chief.tolist()), list[Reading]()
+        for instrument in self._instruments:
+            instrument.read(tick, *states, outage, arrived)
+        return arrived
 
     def inject(self, faults: SatelliteFaults) -> None:
         """Take readings with these faults from now on."""

@@ -147,7 +147,10 @@ class Thruster:
             its end; and why the force differs from the command beyond lag, rounding, noise and misalignment.
         """
         force, state, reasons = self.fire(command, eclipse, state)
-        return (force, state, reasons) if force is NO_FORCE else self.expel(force, state, reasons)
+        limits = self.parameters
+        if force is NO_FORCE or not (limits.specific_impulse or limits.misalignment):  # most often, nothing to do
+            return force, state, reasons
+        return self.expel(force, state, reasons)
 
     def fire(
         self, command: Sequence[float], eclipse: bool, state: ThrusterState

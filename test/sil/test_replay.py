@@ -40,7 +40,7 @@ def test_an_unchanged_replay_of_a_graph_run_gives_the_recorded_bits(
     assert identical(recorded, again, gnc_topics(recorded)) == []
 
 
-def test_a_flight_with_faults_has_its_bits_on_graph_in_process_and_replayed(
+def test_a_flight_with_faults_has_its_bits_on_graph_in_process_and_again(
     fly: Callable[..., Bag], tmp_path: Path
 ) -> None:
     scenario = yaml.safe_load(find_scenario("leader_follower").read_text())

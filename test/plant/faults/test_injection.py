@@ -87,8 +87,7 @@ def test_the_same_seed_gives_the_same_bits_with_any_fault(name: str, fly: Fly) -
     assert repr((one.measurements, one.truths, one.events)) == repr((other.measurements, other.truths, other.events))
 
 
-def test_a_fault_that_ends_leaves_a_sensor_as_if_it_had_never_been(fly: Fly) -> None:
-    """Of the telemetry and sensors: nothing of them acts on the truth here."""
+def test_after_a_fault_of_measurements_they_are_as_without_it(fly: Fly) -> None:
     names = [name for name, fault in FAULTS.items() if "told" not in str(fault.__dataclass_fields__.keys())]
     assert len(names) == 14
     faulty, clean = fly(*(example(name, "at: 3.0, until: 15.0") for name in names)), fly()
@@ -235,7 +234,7 @@ def test_a_flight_with_faults_to_come_has_the_bits_of_one_without() -> None:
 @pytest.mark.thorough
 @settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
 @given(st.lists(entries(latest=20.0), max_size=5), st.integers(0, 3))
-def test_any_valid_faults_leave_the_plant_finite_and_deterministic(planned: list[dict[str, Any]], seed: int) -> None:
+def test_any_valid_faults_leave_the_plant_finite_and_repeatable(planned: list[dict[str, Any]], seed: int) -> None:
     values = VALUES | {"faults": [text_of(each) for each in planned], "seed": seed}
     one, other = (Flight(Plant(load(PlantParameters, values))).fly(25, COMMAND) for _ in range(2))
     for name in values["deputies"]:

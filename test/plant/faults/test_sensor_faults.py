@@ -202,7 +202,7 @@ def test_faults_of_one_sensor_act_in_the_order_given(fly: Fly) -> None:
     assert twice == pytest.approx(clean + 40.0, abs=ROUNDING)
 
 
-def test_a_bias_before_a_freeze_is_frozen_and_one_after_is_added_once(fly: Fly) -> None:
+def test_a_bias_is_frozen_with_the_reading_or_added_to_it_once(fly: Fly) -> None:
     clean, early = fly().readings()["radius"], "{at: 0.0, deputy: deputy1, fault: bias, sensor: radius, value: 20.0}"
     for faults in ((early, entry("freeze")), (entry("freeze"), early)):
         faulty = fly(*faults).readings()["radius"]
