@@ -5,8 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from formation_gnc.plant.faults.fault import Memory
 from formation_gnc.plant.faults.registry import FAULTS
-from formation_gnc.plant.faults.sensors import SensorFault
+from formation_gnc.plant.faults.sensors import Bias, Drift, Sample, SensorFault
 from formation_gnc.sensors.registry import sensors
 from formation_gnc.types import NANOSECONDS
 
@@ -224,3 +225,15 @@ def test_what_is_random_is_so_by_the_seed_whatever_else_fails(fly: Fly) -> None:
     seed = {"seed": 2}
     reseeded = differences(fly(wild, ticks=200, values=seed), fly(ticks=200, values=seed), "radius")
     assert pattern != [bool(each.any()) for each in reseeded.values()]
+
+
+@pytest.mark.parametrize(("value", "expected"), [((5.0,), [6.0, 7.0, 8.0]), ((1.0, 2.0, 3.0), [2.0, 4.0, 6.0])])
+def test_a_reading_of_several_values_has_one_error_or_one_for_each(
+    value: tuple[float, ...], expected: list[float]
+) -> None:
+    sample = Sample("radius", [1.0, 2.0, 3.0], [0.0] * 3, [1.0] * 3, 0)
+    memory = Memory(np.random.default_rng(1))
+    Bias(at=0.0, deputy="deputy1", sensor="radius", value=value).alter(sample, memory, 0.0)
+    assert sample.values == expected
+    Drift(at=0.0, deputy="deputy1", sensor="radius", rate=value).alter(sample, memory, 0.0)
+    assert sample.values == expected
