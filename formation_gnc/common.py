@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import sqrt
 
-from formation_gnc.errors import ParameterError
+from formation_gnc.errors import ConfigurationError, ParameterError
 from formation_gnc.orbit.constants import MU
 from formation_gnc.orbit.elements import Elements
 from formation_gnc.parameters import parameter
@@ -71,3 +71,18 @@ class CommonParameters:
     def mean_motion(self) -> float:
         """Mean motion of the chief's two-body orbit, rad/s."""
         return sqrt(MU / self.chief.semi_major_axis**3)
+
+
+def whole_ticks(name: str, duration: float, tick_ns: int) -> int:
+    """Ticks of `tick_ns` ns in the duration (s) that a parameter gives.
+
+    Raises:
+        ConfigurationError: it is not a whole number of ticks.
+    """
+    ticks, rest = divmod(round(duration * NANOSECONDS), tick_ns)
+    if rest:
+        raise ConfigurationError(
+            f"parameter {name}: {duration!r} s is not allowed; "
+            f"it must be a whole number of ticks of {tick_ns / NANOSECONDS:g} s"
+        )
+    return ticks

@@ -18,6 +18,7 @@ import yaml
 
 from formation_gnc.errors import ParameterError, nearest
 from formation_gnc.parameter_yaml import ParameterLoader
+from formation_gnc.records import ParameterChange
 
 OWN_OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides")
 """Prefixes of parameters that every ROS node may have besides its schema."""
@@ -288,3 +289,14 @@ def differences(before: Any, after: Any) -> dict[str, Any]:
     """Values of `after` by dotted name where they differ from those of `before`."""
     old = dump(before)
     return {name: value for name, value in dump(after).items() if name not in old or old[name] != value}
+
+
+def change_in_words(before: Any, after: Any) -> tuple[list[ParameterChange], str]:
+    """Differences of two instances of a schema for an event: as records, and for people."""
+    old, new = dump(before), differences(before, after)
+    changes = [ParameterChange(name, to_json(old[name]), to_json(value)) for name, value in new.items()]
+    return changes, ", ".join(f"{name}: {_text(old[name])} -> {_text(value)}" for name, value in new.items())
+
+
+def _text(value: Any) -> str:
+    return value if isinstance(value, str) else to_json(value)

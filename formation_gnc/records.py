@@ -73,6 +73,7 @@ class EventKind(IntEnum):
     MISS = 14
     THRUSTERS = 15
     END = 16
+    FAULT = 17
 
 
 WARNINGS = frozenset(

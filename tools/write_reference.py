@@ -15,6 +15,9 @@ from formation_gnc.flight.topics import Topic
 from formation_gnc.guidance.parameters import GuidanceParameters
 from formation_gnc.navigation.parameters import NavigationParameters
 from formation_gnc.parameters import Leaf, leaves
+from formation_gnc.plant.faults.fault import Fault
+from formation_gnc.plant.faults.plan import FORM
+from formation_gnc.plant.faults.registry import FAULTS
 from formation_gnc.plant.parameters import PlantParameters
 from formation_gnc.recording.layout import LAYOUT, foxglove_layout
 from formation_gnc.recording.parameters import RecorderParameters
@@ -54,6 +57,13 @@ Every parameter of every node, from the schemas that the nodes themselves check 
 A scenario is one ROS 2 parameter file for all nodes: `params/leader_follower.yaml` shows how.
 """
 
+FAULTS_INTRODUCTION = f"""
+## Faults
+
+Fields of an entry of the plant's `faults`, besides `at`, `until`, `deputy` and `fault`, such as
+`{FORM}`: see [fault injection](../fault_injection.md). One value may stand for a list of one.
+"""
+
 
 def parameters_page() -> str:
     """The page of all parameters of all nodes."""
@@ -63,24 +73,35 @@ def parameters_page() -> str:
     for node, schema in SCHEMAS.items():
         own = [leaf for leaf in leaves(schema, {"deputies": ["DEPUTY"]}) if leaf.name not in known]
         sections += [f"\n## {node}\n", *_table(own)]
-    return "\n".join(sections) + "\n"
+    return "\n".join([*sections, FAULTS_INTRODUCTION, *_faults_table()]) + "\n"
+
+
+def _faults_table() -> Iterator[str]:
+    common = [leaf.name for leaf in leaves(Fault, {})]
+    yield "| fault | field | type | unit | default | allowed | meaning |"
+    yield "|---|---|---|---|---|---|---|"
+    for name, fault in FAULTS.items():
+        yield f"| `{name}` | | | | | | {str(fault.__doc__).splitlines()[0].rstrip('.')} |"
+        for leaf in leaves(fault, {}):
+            if leaf.name not in common:
+                yield _row([f"`{leaf.name}`", *_cells(leaf)], "| ")
 
 
 def _table(rows: list[Leaf]) -> Iterator[str]:
     yield "| name | type | unit | default | allowed | meaning | in flight |"
     yield "|---|---|---|---|---|---|---|"
     for leaf in rows:
-        limits = leaf.limits
-        cells = [
-            f"`{leaf.name}`",
-            leaf.type_name,
-            limits.unit,
-            _default(leaf),
-            limits.allowed(),
-            limits.doc,
-            "yes" if limits.in_flight else "",
-        ]
-        yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+        yield _row([f"`{leaf.name}`", *_cells(leaf), "yes" if leaf.limits.in_flight else ""])
+
+
+def _cells(leaf: Leaf) -> list[str]:
+    """Type, unit, default, allowed values and meaning."""
+    limits = leaf.limits
+    return [leaf.type_name, limits.unit, _default(leaf), limits.allowed(), limits.doc]
+
+
+def _row(cells: list[str], before: str = "") -> str:
+    return before + "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
 def _default(leaf: Leaf) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 from formation_gnc.common import CommonParameters
 from formation_gnc.errors import ConfigurationError, ParameterError
 from formation_gnc.flight.schedule import parse_schedule
-from formation_gnc.parameters import change, differences, dump, parameter, to_json
+from formation_gnc.parameters import change, change_in_words, differences, dump, parameter, to_json
 from formation_gnc.records import Event, EventKind, ParameterChange
 from formation_gnc.types import NANOSECONDS
 
@@ -251,11 +251,5 @@ class FlightModule[P: ModuleParameters, D](ABC):
         if "schedule" in new.changes:
             self.pending = new.plan
         self.activate(old, new)
-        before, after = dump(old.parameters), differences(old.parameters, new.parameters)
-        changes = [ParameterChange(name, to_json(before[name]), to_json(value)) for name, value in after.items()]
-        detail = ", ".join(f"{name}: {_text(before[name])} -> {_text(value)}" for name, value in after.items())
+        changes, detail = change_in_words(old.parameters, new.parameters)
         self.log(time, EventKind.PARAMETERS, detail, changes=changes)
-
-
-def _text(value: Any) -> str:
-    return value if isinstance(value, str) else to_json(value)

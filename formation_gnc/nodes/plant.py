@@ -1,5 +1,6 @@
 """The plant node: owns time, and lets a tick pass when every deputy has answered."""
 
+from collections.abc import Callable, Mapping
 from functools import partial
 from time import monotonic
 from typing import Any
@@ -42,6 +43,12 @@ class PlantNode(ConfiguredNode):
 
     def _on_progress(self, progress: Clock) -> None:
         self.executive.recorded(progress.time, monotonic())
+
+    def stage_parameters(self, changes: Mapping[str, Any]) -> tuple[Any, Callable[[], None]]:
+        """Validate a change in flight; it takes effect at the next tick."""
+        plant = self.executive.simulation.plant
+        staged = plant.stage(changes)
+        return staged, lambda: plant.commit(staged)
 
     def publish(self, topic: str, record: Any) -> None:
         """Publish a record; events are logged too."""

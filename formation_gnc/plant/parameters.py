@@ -8,6 +8,7 @@ from formation_gnc.errors import ParameterError
 from formation_gnc.orbit.forces.force import Body
 from formation_gnc.orbit.forces.model import Forces
 from formation_gnc.parameters import parameter, per_name
+from formation_gnc.plant.faults.plan import FORM, PlannedFault, plan_faults
 from formation_gnc.plant.sensors import SensorSuite
 from formation_gnc.plant.thrusters import ThrusterParameters
 from formation_gnc.types import NANOSECONDS
@@ -51,13 +52,19 @@ class PlantParameters(CommonParameters):
     wait_for_recorder: bool = parameter(False, doc="do not start before a recorder listens to everything")
     deputies: tuple[str, ...] = parameter(("deputy1",), doc="names of the deputies, each a namespace")
     deputy: dict[str, DeputyParameters] = per_name("deputies")
+    faults: tuple[str, ...] = parameter(
+        (),
+        in_flight=True,
+        doc=f"faults injected, each like `{FORM}`, in the order in which they act. What is added in flight and "
+        "should have begun holds at once; what is left out ends",
+    )
 
     def __post_init__(self) -> None:
         """Check the names of the deputies and the duration.
 
         Raises:
-            ParameterError: a name that is no namespace or comes twice, a duration below a tick, or one that ends
-                beyond the years of the ephemerides.
+            ParameterError: a name that is no namespace or comes twice, a duration below a tick, one that ends
+                beyond the years of the ephemerides, or a fault that is not allowed.
         """
         super().__post_init__()
         if len(set(self.deputies)) != len(self.deputies) or not self.deputies:
@@ -76,6 +83,12 @@ class PlantParameters(CommonParameters):
                 f"parameter duration: {self.duration!r} s is not allowed; with epoch {self.epoch!r} s it must end by "
                 f"{LAST_EPOCH!r} s since J2000.0, where the ephemerides of Sun and Moon end"
             )
+        self.planned_faults  # noqa: B018 - to be checked
+
+    @cached_property
+    def planned_faults(self) -> tuple[PlannedFault, ...]:
+        """The faults; raises ParameterError for one that is not allowed."""
+        return plan_faults(self.faults, self.deputy, self.tick_ns)
 
     @cached_property
     def ticks(self) -> int:

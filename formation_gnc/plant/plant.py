@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from formation_gnc.orbit.frames import (
     relative_to_first,
 )
 from formation_gnc.orbit.propagation import Propagator
+from formation_gnc.parameters import change, change_in_words
+from formation_gnc.plant.faults.injection import FaultInjection, SatelliteFaults
 from formation_gnc.plant.parameters import DeputyParameters, PlantParameters
 from formation_gnc.plant.sensors import Sensors
 from formation_gnc.plant.thrusters import NO_FORCE, Denial, Thruster, ThrusterState
@@ -37,6 +40,7 @@ class _Satellite:
     eclipse: bool = False
     missed: bool = True
     denied: tuple[Denial, ...] = ()
+    faults: SatelliteFaults | None = None
 
 
 class Plant:
@@ -69,6 +73,8 @@ class Plant:
         self._forces = np.zeros((len(self._states), 3))
         """Thrust applied over the previous tick, (N, 3), Hill frame at its start, N."""
         self._satellites = [self._satellite(name, parameters.deputy[name]) for name in parameters.deputies]
+        self._faults = FaultInjection(parameters.planned_faults, parameters.seed)
+        self._committed: PlantParameters | None = None
         self._propagator = Propagator(
             parameters.tick,
             math.ceil(parameters.tick / parameters.step),
@@ -90,6 +96,8 @@ class Plant:
 
     def measure(self) -> dict[str, Measurement]:
         """Measurement of each deputy at the current tick, by name; once per tick, before `step`."""
+        if self.tick >= self._faults.due:
+            self._update_faults()
         chief, seconds = self._states[0], self.time / NANOSECONDS
         measurements = {}
         for index, satellite in enumerate(self._satellites, 1):  # indexed: iterating over an array is slow
@@ -97,7 +105,7 @@ class Plant:
             satellite.eclipse = self._propagator.illumination(seconds, state) < 1.0
             missed = satellite.missed
             # Positional: keyword arguments take twice as long.
-            measurements[satellite.name] = Measurement(
+            measurement = Measurement(
                 self.time,
                 satellite.name,
                 chief,
@@ -108,6 +116,9 @@ class Plant:
                 missed,
                 satellite.sensors.fix(relative_from_inertial(chief, state)) if missed else NO_FIX,
             )
+            measurements[satellite.name] = measurement
+            if satellite.faults is not None:
+                satellite.faults.tell(measurement)
         return measurements
 
     def truth(self) -> Truth:
@@ -147,8 +158,11 @@ class Plant:
         for satellite in self._satellites:
             command = forces.get(satellite.name)
             masses.append(satellite.state.mass)
-            force, satellite.state, denied = satellite.thruster.apply(
-                NO_FORCE if command is None else command.tolist(), satellite.eclipse, satellite.state
+            commanded = NO_FORCE if command is None else command.tolist()
+            force, satellite.state, denied = (
+                satellite.thruster.apply(commanded, satellite.eclipse, satellite.state)
+                if satellite.faults is None
+                else satellite.faults.fire(satellite.thruster, commanded, satellite.eclipse, satellite.state, self.time)
             )
             applied.append(force)
             satellite.missed = command is None or Denial.NOT_FINITE in denied
@@ -163,6 +177,40 @@ class Plant:
         self.time += self.parameters.tick_ns
         self.finished = self.tick == self.parameters.ticks
         return missed
+
+    def stage(self, changes: Mapping[str, Any]) -> PlantParameters:
+        """Parameters with a change in flight, without effect yet.
+
+        Raises:
+            ParameterError: the change is not allowed, or adds a fault that should have ended.
+        """
+        before = self._committed or self.parameters
+        changed = change(before, changes)
+        for each in changed.planned_faults:
+            if each.end <= self.tick and each.entry not in before.faults:
+                raise ParameterError(
+                    f"parameter faults: {each.entry!r} is not allowed; until must be above "
+                    f"{self.time / NANOSECONDS:g} s, which is now"
+                )
+        return changed
+
+    def commit(self, staged: PlantParameters) -> None:
+        """Let staged parameters take effect when the next tick begins."""
+        self._committed, self._faults.due = staged, self.tick
+
+    def _update_faults(self) -> None:
+        """Take faults changed in flight, and begin and end those that are due."""
+        if self._committed is not None:
+            before, self.parameters, self._committed = self.parameters, self._committed, None
+            changes, detail = change_in_words(before, self.parameters)
+            if changes:
+                self._events.append(Event(self.time, self.tick, "/plant", EventKind.PARAMETERS, "", changes, detail))
+            self._events += self._faults.replace(self.parameters.planned_faults, self.tick, self.time)
+        self._events += self._faults.update(self.tick, self.time)
+        for satellite in self._satellites:
+            if satellite.faults is None and satellite.name in self._faults.deputies:
+                satellite.faults = self._faults.deputies[satellite.name]
+                satellite.sensors.inject(satellite.faults)
 
     def _note(self, satellite: _Satellite, denied: tuple[Denial, ...]) -> None:
         """Record an event when the reasons change for which a deputy's thrusters deny its command."""

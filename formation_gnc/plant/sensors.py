@@ -1,14 +1,19 @@
 """Readings of a deputy's sensors: the measurement functions of the truth, with an error model each."""
 
+from bisect import insort
 from collections.abc import Iterator
 from dataclasses import dataclass, make_dataclass
 from math import gcd
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 
+from formation_gnc.common import whole_ticks
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.parameters import parameter, with_fields
+from formation_gnc.plant.faults.injection import SatelliteFaults
+from formation_gnc.plant.faults.sensors import Sample
 from formation_gnc.randomness import generator
 from formation_gnc.records import Reading
 from formation_gnc.sensors.registry import sensors
@@ -70,19 +75,20 @@ class _Instrument:
         name = f"{deputy}.sensors.{sensor.name}"
         self._sensor, self._model = sensor, model
         self._bias, self._sigma = per_value(model.bias), per_value(model.sigma)
-        self._interval = _whole_ticks(f"{name}.interval", model.interval, tick_ns)
-        self._latency = _whole_ticks(f"{name}.latency", model.latency, tick_ns)
+        self._interval = whole_ticks(f"{name}.interval", model.interval, tick_ns)
+        self._latency = whole_ticks(f"{name}.latency", model.latency, tick_ns)
         if self._interval < 1:
             raise ConfigurationError(
                 f"parameter {name}.interval: {model.interval!r} s is not allowed; it must be a tick or more"
             )
         self._draws = _draws(generator(seed, f"{deputy}/sensors/{sensor.name}"), sensor.size)
-        self._age = self._latency * tick_ns
+        self._age, self._tick_ns = self._latency * tick_ns, tick_ns
         self.beat = gcd(self._interval, self._latency)
-        self._in_transit: list[tuple[int, list[float]]] = []
+        self.faults: SatelliteFaults | None = None
+        self._in_transit: list[tuple[int, Reading]] = []
 
-    def read(self, tick: int, deputy: list[float], chief: list[float], outage: bool) -> Reading | None:
-        """Take the reading that is due at a tick; returns the one that arrives at it, if one does."""
+    def read(self, tick: int, deputy: list[float], chief: list[float], outage: bool, arrived: list[Reading]) -> None:
+        """Take the reading that is due at a tick; adds those that arrive at it to others."""
         if tick % self._interval == 0:
             # Drawn even when unused: switching one error on leaves the others as they were.
             noise, (dropped, stray, side) = next(self._draws)
@@ -93,10 +99,21 @@ class _Instrument:
                 truth = self._sensor.measure(deputy, chief)
                 errors = zip(truth, self._bias, self._sigma, noise, strict=True)
                 values = [value + bias + sigma * each for value, bias, sigma, each in errors]
-                self._in_transit.append((tick + self._latency, values))
-        if self._in_transit and self._in_transit[0][0] == tick:
-            return Reading(self._sensor.name, self._in_transit.pop(0)[1], self._age)
-        return None
+                if self.faults is None:
+                    self._in_transit.append((tick + self._latency, Reading(self._sensor.name, values, self._age)))
+                else:
+                    self._read_with(self.faults, tick, values, noise)
+        while self._in_transit and self._in_transit[0][0] == tick:
+            arrived.append(self._in_transit.pop(0)[1])
+
+    def _read_with(self, faults: SatelliteFaults, tick: int, values: list[float], noise: list[float]) -> None:
+        random = [sigma * each for sigma, each in zip(self._sigma, noise, strict=True)]
+        sample = Sample(self._sensor.name, values, random, self._sigma, self._age)
+        faults.read(self._sensor.name, sample, tick * self._tick_ns)
+        if not sample.lost:
+            arrival = tick + self._latency + sample.delay // self._tick_ns
+            reading = Reading(sample.sensor, list(sample.values), sample.age)
+            insort(self._in_transit, (arrival, reading), key=itemgetter(0))
 
 
 def _draws(random: np.random.Generator, size: int) -> Iterator[tuple[list[float], list[float]]]:
@@ -142,20 +159,17 @@ class Sensors:
         if not self._instruments or tick % self._beat:
             return []
         outage = self._outage[0] <= tick * self._tick_ns / NANOSECONDS < self._outage[1]
-        states = deputy.tolist(), chief.tolist()
-        readings = [instrument.read(tick, *states, outage) for instrument in self._instruments]
-        return [reading for reading in readings if reading is not None]
+        states, arrived = (deputy.tolist(), chief.tolist()), list[Reading]()
+        for instrument in self._instruments:
+            instrument.read(tick, *states, outage, arrived)
+        return arrived
+
+    def inject(self, faults: SatelliteFaults) -> None:
+        """Take readings with these faults from now on."""
+        self._beat = 1  # a late reading may arrive at any tick
+        for instrument in self._instruments:
+            instrument.faults = faults
 
     def fix(self, relative_state: Vector) -> Vector:
         """Acquisition fix: the relative state (6,) with its error."""
         return relative_state + self._fix_sigma * self._fixes.standard_normal(6)
-
-
-def _whole_ticks(name: str, duration: float, tick_ns: int) -> int:
-    ticks, rest = divmod(round(duration * NANOSECONDS), tick_ns)
-    if rest:
-        raise ConfigurationError(
-            f"parameter {name}: {duration!r} s is not allowed; "
-            f"it must be a whole number of ticks of {tick_ns / NANOSECONDS:g} s"
-        )
-    return ticks

@@ -9,7 +9,7 @@ import numpy as np
 
 from formation_gnc.errors import ParameterError
 from formation_gnc.parameters import parameter
-from formation_gnc.types import Vector
+from formation_gnc.types import Matrix, Vector
 
 NO_FORCE = (0.0, 0.0, 0.0)
 
@@ -111,8 +111,8 @@ class Thruster:
                 f"it must be 0 or from {1e-9 * largest:g} to the largest force, {largest:g}"
             )
         self.parameters = parameters
-        self._tick, self._generator = tick, generator
-        self._mounting = _rotation(parameters.misalignment * generator.standard_normal(3))
+        self.tick, self._generator = tick, generator
+        self._mounting = rotation_about(parameters.misalignment * generator.standard_normal(3))
 
     def start(self, mass: float) -> ThrusterState:
         """State before the first tick.
@@ -146,6 +146,19 @@ class Thruster:
             The applied force, (3,), Hill frame, N, held over the tick with the mass at its start; the state at
             its end; and why the force differs from the command beyond lag, rounding, noise and misalignment.
         """
+        force, state, reasons = self.fire(command, eclipse, state)
+        limits = self.parameters
+        if force is NO_FORCE or not (limits.specific_impulse or limits.misalignment):  # most often, nothing to do
+            return force, state, reasons
+        return self.expel(force, state, reasons)
+
+    def fire(
+        self, command: Sequence[float], eclipse: bool, state: ThrusterState
+    ) -> tuple[Sequence[float], ThrusterState, tuple[Denial, ...]]:
+        """As `apply`, up to the noise: propellant and mounting are left to `expel`.
+
+        The force is NO_FORCE itself where all thrust is denied.
+        """
         limits = self.parameters
         noise = self._generator.standard_normal(3) if limits.magnitude_noise > 0.0 else None
         denial = self._denial(command, eclipse, state.mass)
@@ -153,18 +166,43 @@ class Thruster:
             return NO_FORCE, ThrusterState(state.mass), (denial,) if any(command) else ()
         force, reasons = self._valves(command)
         if limits.lag > 0.0:
-            force, end = self._lagged(state.output, force)
+            force, end = lagged(state.output, force, limits.lag, self.tick)
             state = ThrusterState(state.mass, end)
         if noise is not None:
             force = [f * (1.0 + limits.magnitude_noise * float(n)) for f, n in zip(force, noise, strict=True)]
+        return force, state, reasons
+
+    def expel(
+        self,
+        force: Sequence[float],
+        state: ThrusterState,
+        reasons: tuple[Denial, ...],
+        leak: Sequence[float] | None = None,
+        rotation: Matrix | None = None,
+    ) -> tuple[Sequence[float], ThrusterState, tuple[Denial, ...]]:
+        """Second half of `apply`: use propellant and turn the force.
+
+        Args:
+            force: from `fire`, (3,), N.
+            state: from `fire`.
+            reasons: from `fire`.
+            leak: force of what leaves beside the thrusters, (3,), Hill frame, N.
+            rotation: of the thrusters' forces beyond their mounting error, (3, 3).
+        """
+        limits = self.parameters
         if limits.specific_impulse > 0.0:
-            mass, fraction = self._burn(force, state.mass)
+            mass, fraction = self._burn(force, state.mass, leak)
             state = ThrusterState(mass, state.output)
             if fraction < 1.0:
                 reasons += (Denial.EMPTY,)
                 force, state = [f * fraction for f in force], ThrusterState(mass)
+                leak = leak and [f * fraction for f in leak]
         if limits.misalignment > 0.0:
             force = (self._mounting @ np.array(force)).tolist()
+        if rotation is not None:
+            force = (rotation @ np.array(force)).tolist()
+        if leak is not None:
+            force = [f + more for f, more in zip(force, leak, strict=True)]
         return force, state, reasons
 
     def _denial(self, command: Sequence[float], eclipse: bool, mass: float) -> Denial | None:
@@ -201,40 +239,49 @@ class Thruster:
                 # Towards zero where rounding would break the limit.
                 steps = min(round(level / limits.quantum), int(limits.limit[axis] / limits.quantum + 1e-9))
                 level = steps * limits.quantum
-            if abs(value) < limits.dead_band or level * self._tick < limits.minimum_impulse:
+            if abs(value) < limits.dead_band or level * self.tick < limits.minimum_impulse:
                 if value != 0.0:
                     reasons.append(Denial.TOO_SMALL)
                 level = 0.0
             output[axis] = copysign(level, value)
         return output, tuple(dict.fromkeys(reasons)) if reasons else ()
 
-    def _lagged(
-        self, before: tuple[float, float, float], output: list[float]
-    ) -> tuple[list[float], tuple[float, float, float]]:
-        """Mean force over the tick, and the force at its end, of a first-order lag."""
-        lag = self.parameters.lag
-        left = exp(-self._tick / lag)
-        mean = lag / self._tick * (1.0 - left)
-        given = [to + (now - to) * mean for now, to in zip(before, output, strict=True)]
-        x, y, z = (to + (now - to) * left for now, to in zip(before, output, strict=True))
-        return given, (x, y, z)
-
-    def _burn(self, force: list[float], mass: float) -> tuple[float, float]:
+    def _burn(self, force: Sequence[float], mass: float, leak: Sequence[float] | None) -> tuple[float, float]:
         """Mass after the tick, kg, and the fraction of the force that the propellant is enough for."""
         limits = self.parameters
         thrust = hypot(*force) if limits.total_limit > 0.0 else sum(abs(each) for each in force)
-        needed = thrust * self._tick / (limits.specific_impulse * STANDARD_GRAVITY)
+        if leak is not None:
+            thrust += hypot(*leak)
+        needed = thrust * self.tick / (limits.specific_impulse * STANDARD_GRAVITY)
         if needed <= mass - limits.dry_mass:
             return mass - needed, 1.0
         return limits.dry_mass, (mass - limits.dry_mass) / needed
 
 
-def _rotation(vector: Vector) -> Vector:
+def lagged(
+    before: tuple[float, float, float], output: Sequence[float], lag: float, tick: float
+) -> tuple[list[float], tuple[float, float, float]]:
+    """Mean force over a tick, and the force at its end, of a first-order lag.
+
+    Args:
+        before: force at the start of the tick, (3,), N.
+        output: force that it tends to, (3,), N.
+        lag: time constant, s.
+        tick: s.
+    """
+    left = exp(-tick / lag)
+    mean = lag / tick * (1.0 - left)
+    given = [to + (now - to) * mean for now, to in zip(before, output, strict=True)]
+    x, y, z = (to + (now - to) * left for now, to in zip(before, output, strict=True))
+    return given, (x, y, z)
+
+
+def rotation_about(vector: Vector) -> Matrix:
     """Rotation matrix about a vector by its length (Rodrigues)."""
     x, y, z = vector
     angle = float(np.linalg.norm(vector))
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     # Limits of sin(a)/a and (1 - cos a)/a^2 at zero are left to NumPy's sinc.
     first, second = np.sinc(angle / np.pi), 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2
-    rotation: Vector = np.eye(3) + first * cross + second * cross @ cross
+    rotation: Matrix = np.eye(3) + first * cross + second * cross @ cross
     return rotation

@@ -3,6 +3,8 @@
 from pathlib import Path
 
 import pytest
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
 
 from formation_gnc.transport.node import ConfiguredNode
 
@@ -70,3 +72,27 @@ def test_a_node_says_where_it_differs_from_the_plant(bench: Bench, file: Path, w
 
 def test_recorder_and_display_share_the_plants_tick(bench: Bench, file: Path) -> None:
     assert [bench.make(name, files=(file,)).values.tick for name in ("recorder", "display", "plant")] == [2.0] * 3
+
+
+def test_faults_are_set_in_flight_from_the_next_tick_on(bench: Bench) -> None:
+    plant = bench.make("plant")
+    fault = "{at: 0.0, deputy: deputy1, fault: bias, sensor: radius, value: 20.0}"
+
+    def put(*faults: str) -> tuple[bool, str]:
+        request = SetParameters.Request(parameters=[Parameter("faults", value=list(faults)).to_parameter_msg()])
+        (result,) = bench.call(plant, SetParameters, "set_parameters", request).results
+        return result.successful, result.reason
+
+    accepted, reason = put(fault.replace("radius", "radios"))
+    assert (accepted, reason.partition("}': ")[2]) == (False, "sensor: 'radios' is unknown; did you mean radius?")
+    assert plant.get_parameter("faults").value == []
+    assert put(fault) == (True, "")
+    assert plant.get_parameter("faults").value == [fault]
+    flown = plant.executive.simulation.plant
+    flown.measure()
+    assert [str(event) for event in flown.take_events()] == [
+        f'tick 0: parameters: faults: [] -> ["{fault}"]',
+        "tick 0: fault: deputy1: begins: radius biased by 20 m",
+    ]
+    assert put() == (True, "")
+    assert plant.get_parameter("faults").value == []

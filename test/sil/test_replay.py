@@ -40,6 +40,27 @@ def test_an_unchanged_replay_of_a_graph_run_gives_the_recorded_bits(
     assert identical(recorded, again, gnc_topics(recorded)) == []
 
 
+def test_a_flight_with_faults_has_its_bits_on_graph_in_process_and_again(
+    fly: Callable[..., Bag], tmp_path: Path
+) -> None:
+    scenario = yaml.safe_load(find_scenario("leader_follower").read_text())
+    scenario["/plant"]["ros__parameters"]["faults"] = [
+        "{at: 50.0, until: 200.0, deputy: deputy1, fault: drift, sensor: radius, rate: 0.5}",
+        "{at: 60.0, deputy: deputy1, fault: outliers, sensor: latitude, share: 0.2}",
+        "{at: 70.0, deputy: deputy1, fault: stuck_on, force: [0.002, 0.0, 0.0], told: false}",
+        "{at: 80.0, until: 150.0, deputy: deputy1, fault: chief_drift, rate: [0.0, 0.5, 0.0]}",
+    ]
+    path = tmp_path / "faults.yaml"
+    path.write_text(yaml.safe_dump(scenario))
+    recorded = fly("--duration", "300", scenario=str(path))
+    assert list(recorded.arrays("/events")["kind"]).count(EventKind.FAULT) == 6
+    inside, again = tmp_path / "inside", tmp_path / "again"
+    assert main(["sil", str(path), "--duration", "300", "--in-process", "--bag", str(inside), "--accept-lost"]) == 0
+    assert main(["replay", str(recorded.path), "--bag", str(again)]) == 0
+    for other in (inside, again):
+        assert identical(recorded, Bag(other), [*gnc_topics(recorded), "/events"]) == []
+
+
 def test_nodes_restarted_with_other_parameters_replay_with_them(desk: Desk, capsys: pytest.CaptureFixture[str]) -> None:
     bag = desk.directory / "bag"
     plant, terminals = desk.take_off()
