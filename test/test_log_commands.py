@@ -96,6 +96,7 @@ def test_a_missing_bag_is_rejected_in_one_line(
 
 
 @pytest.mark.thorough
+@pytest.mark.filterwarnings("error:.*axes sizes collapsed:UserWarning")  # by a legend of long paths
 def test_compare_names_identical_and_different_bags(
     reference: Path, other: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

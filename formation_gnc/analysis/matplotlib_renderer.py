@@ -16,6 +16,15 @@ LEGEND_Y = -0.16
 
 LEGEND_COLUMNS = 4
 
+LEGEND_WIDTH = 90
+"""Characters that a line of a legend has room for, below axes of half a picture's width."""
+
+LEGEND_LABEL = 60
+"""Characters of a label in a legend; of a longer one, the end."""
+
+LEGEND_KEY = 8
+"""Width of a curve's sample beside its label, in characters."""
+
 FURTHEST = 1e30
 """Largest coordinate that is drawn: the limits of an axis, and their squares, have to be numbers."""
 
@@ -46,7 +55,9 @@ def draw(figure: Figure, place: Any, plot: Plot) -> None:
     if handles:
         # Below the axes, where it covers no curve.
         place = {"loc": "upper center", "bbox_to_anchor": (0.5, LEGEND_Y), "frameon": False, "fontsize": "small"}
-        axes.legend(handles.values(), handles.keys(), ncols=min(len(handles), LEGEND_COLUMNS), **place)
+        labels = [label if len(label) <= LEGEND_LABEL else f"…{label[1 - LEGEND_LABEL :]}" for label in handles]
+        fitting = LEGEND_WIDTH // (LEGEND_KEY + max(map(len, labels)))
+        axes.legend(handles.values(), labels, ncols=max(1, min(len(handles), LEGEND_COLUMNS, fitting)), **place)
     axes.grid(alpha=0.3)
 
 

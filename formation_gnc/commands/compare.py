@@ -6,6 +6,7 @@ wall time do not count. A bag with several runs counts as so many bags.
 
 import argparse
 import json
+import os
 import string
 from pathlib import Path
 
@@ -43,7 +44,7 @@ def run(options: argparse.Namespace) -> int:
     differences = [identical(bags[0], other, gnc_topics(bags[0], other)) for other in bags[1:]]
     if options.plot is not None:
         try:
-            draw_comparison(bags, [str(path) for path in labels], options.plot)
+            draw_comparison(bags, _short(labels), options.plot)
         except OSError as error:
             raise ConfigurationError(f"plot {options.plot}: {error.strerror or error}") from None
     if options.json:
@@ -79,10 +80,24 @@ def _summary(paths: list[Path], figures: list[RunFigures], differences: list[lis
     }
 
 
+def _letters(paths: list[Path]) -> list[str]:
+    """A letter for each bag; numbers where there are more than letters."""
+    letters = string.ascii_uppercase
+    return list(letters[: len(paths)]) if len(paths) <= len(letters) else list(map(str, range(len(paths))))
+
+
+def _short(paths: list[Path]) -> list[str]:
+    """Letter and path of each bag from where the paths part, for a legend."""
+    common = Path(os.path.commonpath([path.absolute().parent for path in paths]))
+    return [
+        f"{letter}: {path.absolute().relative_to(common)}" for letter, path in zip(_letters(paths), paths, strict=True)
+    ]
+
+
 def _print(paths: list[Path], figures: list[RunFigures], differences: list[list[Difference]]) -> None:
     console = Console(highlight=False)
-    letters = string.ascii_uppercase if len(paths) <= len(string.ascii_uppercase) else list(map(str, range(len(paths))))
-    for letter, path in zip(letters, paths, strict=False):
+    letters = _letters(paths)
+    for letter, path in zip(letters, paths, strict=True):
         console.print(f"{letter}: {path}", soft_wrap=True, markup=False)
     labels: list[str] = []
     values: list[list[str]] = [[] for _ in paths]
@@ -95,8 +110,8 @@ def _print(paths: list[Path], figures: list[RunFigures], differences: list[list[
                 column.append(figure.text(value))
             for column, value in zip(deltas, row[1:], strict=True):
                 column.append(figure.difference(value, row[0]))
-    columns = [[letter, *column] for letter, column in zip(letters, values, strict=False)]
-    columns += [[f"{letter} - {letters[0]}", *column] for letter, column in zip(letters[1:], deltas, strict=False)]
+    columns = [[letter, *column] for letter, column in zip(letters, values, strict=True)]
+    columns += [[f"{letter} - {letters[0]}", *column] for letter, column in zip(letters[1:], deltas, strict=True)]
     print_table(console, [["figure", *labels], *columns])
     for path, found in zip(paths[1:], differences, strict=True):
         print(f"{path}: {IDENTICAL}" if not found else f"{path}: differs from {paths[0]}, first of each topic:")
