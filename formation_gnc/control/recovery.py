@@ -36,6 +36,9 @@ OVERASKED = 2.0
 RETRIES = 8
 """Trials per revolution for an error out of reach."""
 
+STARTS = 64
+"""Trajectories of a regulator per revolution, at most: more do nothing about what a model lacks."""
+
 ITERATIONS = 30
 """Newton iterations for a costate beyond which a duration counts as too short; five to fifteen suffice."""
 
@@ -84,6 +87,8 @@ class RecoveryTrajectory:
         self._following: Vector = np.zeros(6)
         self._pause = 0
         """Ticks until an error out of reach is tried again."""
+        self._kept = 0
+        """Ticks until a regulator may start another trajectory."""
         self.planned: Vector = NO_THRUST
         """(3,) acceleration of the trajectory in the tick that was regulated last, m/s^2."""
         self.has_begun = False
@@ -96,7 +101,7 @@ class RecoveryTrajectory:
     ) -> tuple[Vector, Vector]:
         """A regulator's acceleration (3,) for this tick, about the trajectory, and the error (6,) from it.
 
-        A trajectory starts where the regulator asks too much.
+        A trajectory starts where the regulator asks too much, unless one has just started.
 
         Args:
             error: (6,) state less target.
@@ -108,7 +113,7 @@ class RecoveryTrajectory:
         self.planned = self.acceleration()
         off = error if self.state is None else error - self.state
         demand = feedback(off) if self.state is None else feedback(off) + self.planned
-        if is_overasked(demand.tolist(), limit.tolist()):
+        if self._kept == 0 and is_overasked(demand.tolist(), limit.tolist()):
             self.begin(error, limit, time)
             if self.state is not None:
                 off, self.planned, self.has_begun = error - self.state, self.acceleration(), True
@@ -122,7 +127,7 @@ class RecoveryTrajectory:
         Without cross-track thruster that motion is left out. No trajectory starts at an error out of reach, nor soon
         after one.
         """
-        self.state, self._transfer, self.planned = None, None, NO_THRUST
+        self.state, self._transfer, self.planned, self._kept = None, None, NO_THRUST, 0
         controlled = np.tile([True, True, bool(limit[2] > 0.0)], 2)
         state = np.where(controlled, error, 0.0)
         if self._pause > 0 or not (np.isfinite(state).all() and limit[1] > 0.0):
@@ -137,6 +142,7 @@ class RecoveryTrajectory:
             costate = self._costate(state, limit, time, duration, controlled)
             if costate is not None:
                 self.state, self._transfer = state, _Transfer(time, duration, costate, limit)
+                self._kept = round(self._model.period / STARTS / self._tick)
                 return
         self._pause = round(self._model.period / RETRIES / self._tick)
 
@@ -158,7 +164,7 @@ class RecoveryTrajectory:
 
     def end(self) -> None:
         """Drop the trajectory, as after ticks that were not regulated."""
-        self.state, self._transfer, self._pause = None, None, 0
+        self.state, self._transfer, self._pause, self._kept = None, None, 0, 0
 
     def acceleration(self) -> Vector:
         """(3,) acceleration for this tick, m/s^2; zero without a trajectory, and at its end."""
@@ -166,7 +172,7 @@ class RecoveryTrajectory:
         if transfer is None or self.state is None:
             return NO_THRUST
         if transfer.left < 0.5 * self._tick:
-            self.state = self._transfer = None
+            self.state, self._transfer, self._kept = None, None, 0
             return NO_THRUST
         phi, gamma = self._step or self._middle_step(transfer.time)
         transfer.costate = np.asarray(np.linalg.solve(phi.T, transfer.costate), dtype=np.float64)
@@ -184,6 +190,7 @@ class RecoveryTrajectory:
     def advance(self) -> None:
         """Move on by a tick under the last acceleration."""
         self._pause -= self._pause > 0
+        self._kept -= self._kept > 0
         if self._transfer is not None and self.state is not None:
             self.state = self._following
             self._transfer.time += self._tick

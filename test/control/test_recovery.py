@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from formation_gnc.control.controller_manager import ControllerManager, ControllerParameters
-from formation_gnc.control.recovery import SHARE, RecoveryTrajectory, is_overasked, least_effort
+from formation_gnc.control.recovery import SHARE, STARTS, RecoveryTrajectory, is_overasked, least_effort
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.parameters import load
 from formation_gnc.relative.hill import HillModel
@@ -74,6 +74,18 @@ def test_an_error_out_of_reach_is_not_tried_again_at_every_tick():
         assert trajectory.state is None
         trajectory.advance()
     assert len(tried) <= 8  # one bisection
+
+
+def test_a_demand_beyond_the_model_starts_few_trajectories():
+    """A constant push of ten times the limit, which no trajectory knows of: clipped, with a new start now and then."""
+    trajectory, started = RecoveryTrajectory(HILL, TICK), 0
+    phi, gamma = HILL.discretise(0.0, TICK)
+    limit, error, ticks = np.full(3, 1e-5), np.zeros(6), round(HILL.period / TICK)
+    for _ in range(ticks):
+        demand, _ = trajectory.regulate(error, limit, 0.0, lambda off: -1e-4 * off[:3] - 1e-2 * off[3:])
+        started += trajectory.has_begun
+        error = phi @ error + gamma @ (np.clip(demand, -limit, limit) + 1e-4)
+    assert 16 <= started <= STARTS + 1
 
 
 def test_what_the_inputs_cannot_cancel_has_no_costate():
