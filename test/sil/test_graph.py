@@ -125,18 +125,21 @@ def test_a_restarted_node_rejoins_and_its_gap_is_logged_and_replays(
     bag = desk.directory / "bag"
     plant, terminals = desk.take_off()
     time.sleep(2.0)
+    before = plant.text.count(": miss: ")  # by the load of the machine
     terminals["navigation"].signal(signal.SIGKILL)
-    wait_until(lambda: "miss" in plant.text, "the plant to miss the navigation")
+    wait_until(lambda: plant.text.count(": miss: ") > before, "the plant to miss the navigation")
     desk.start("navigation")
     assert plant.wait() == 0
     desk.land()
 
     misses = events(bag, EventKind.MISS)
     assert misses
-    assert misses[0][1].startswith("did not answer within 0.5 s")
+    assert misses[0][1].startswith("did not answer within 3 s")
     recorded = Bag(bag)
     answered = set(recorded.arrays("/deputy1/thrust")["stamp_ns"] // 1_000_000_000)
-    assert answered == set(range(900)) - {tick for tick, _ in misses}
+    unanswered = set(range(900)) - answered
+    assert unanswered, "what was asked of the navigation when it was dead"
+    assert unanswered <= {tick for tick, _ in misses}, "all logged; an answer that came too late is recorded besides"
     assert 899 in answered
     # the restarted filter started from a fix and is consistent: the whole error is inside what it believes
     acquired = [tick for tick, _ in events(bag, EventKind.ACQUIRED)]
