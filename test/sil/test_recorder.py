@@ -26,6 +26,8 @@ from formation_gnc.recording import Bag
 from formation_gnc.recording.layout import LAYOUT
 from formation_gnc.recording.provenance import LOST
 from formation_gnc.recording.recover import PARTLY_LOST, recover
+from formation_gnc.recording.writer import FLUSH_INTERVAL
+from formation_gnc.sil.simulation import RECORDER_LAG
 from formation_gnc.transport.qos import LATEST, quality
 from formation_gnc.types import NANOSECONDS
 
@@ -187,13 +189,18 @@ def test_a_full_disk_ends_the_run_with_a_reason_and_saves_what_was_written(desk:
     assert recover(desk.directory / "bag", desk.directory / "saved").status == PARTLY_LOST
 
 
-PACE = 200.0  # simulated s per wall s
+PACE = 200.0  # simulated s per wall s, and ticks
+MOST_LOST = RECORDER_LAG + round(4.0 * FLUSH_INTERVAL * PACE)
+"""Ticks: what the plant may be ahead of the recorder, and what comes until a flush, which a busy machine is late with.
+
+On a quiet one it is less than half a second of wall time, which the property of each test tells.
+"""
 MOMENTS = [pytest.param(number, marks=[pytest.mark.slow] * (number > 1), id=str(number)) for number in range(20)]
 
 
 @pytest.mark.parametrize("everything", [False, True], ids=["recorder", "everything"])
 @pytest.mark.parametrize("number", MOMENTS)
-def test_a_kill_at_any_moment_loses_at_most_half_a_second(
+def test_a_kill_at_any_moment_loses_a_queue_and_a_flush_at_most(
     desk: Desk, number: int, everything: bool, record_property: Callable[[str, object], None]
 ) -> None:
     bag = desk.directory / "bag"
@@ -226,7 +233,7 @@ def test_a_kill_at_any_moment_loses_at_most_half_a_second(
         terminal.wait()
 
     result = recover(bag, desk.directory / "saved")
-    if at_kill < 0.5 * PACE and result.output is None:
+    if at_kill <= MOST_LOST and result.output is None:
         return  # killed before there was anything that had to be saved
     assert result.output is not None
     assert not result.lost
@@ -241,6 +248,6 @@ def test_a_kill_at_any_moment_loses_at_most_half_a_second(
             if channel.topic == topics.CLOCK.name:
                 decoded.append(message.clock.sec)
     assert clocks == decoded == list(range(len(clocks))), "no tick is missing before the last"
-    lacks = (at_kill - max(clocks, default=0)) / PACE
-    record_property("log lost, s of wall time", lacks)
-    assert lacks <= 0.5
+    lacks = at_kill - max(clocks, default=0)
+    record_property("log lost, s of wall time", lacks / PACE)
+    assert lacks <= MOST_LOST
