@@ -1,6 +1,7 @@
 """Faults of the avionics: what becomes of a measurement besides its readings."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -15,6 +16,23 @@ NO_FORCE.setflags(write=False)
 
 class AvionicsFault(Fault[Measurement]):
     """A fault of the telemetry that the avionics give."""
+
+
+class TelemetryFreeze(AvionicsFault):
+    """A field of the telemetry repeats what it told before; the first value where there was none."""
+
+    field: ClassVar[str]
+    """Its name in a measurement."""
+
+    def alter(self, subject: Measurement, memory: Memory, elapsed: float) -> None:
+        """Repeat the value held."""
+        if memory.held is None:
+            self.watch(subject, memory)
+        setattr(subject, self.field, memory.held)
+
+    def watch(self, subject: Measurement, memory: Memory) -> None:
+        """Hold the last value."""
+        memory.held = getattr(subject, self.field)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,23 +52,15 @@ class MassScale(AvionicsFault):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ForceFreeze(AvionicsFault):
+class ForceFreeze(TelemetryFreeze):
     """The applied force told before is repeated; the first one where there was none."""
+
+    field = "applied_force"
 
     @property
     def words(self) -> str:
         """Of the force."""
         return "applied force told frozen"
-
-    def alter(self, subject: Measurement, memory: Memory, elapsed: float) -> None:
-        """Repeat the force held."""
-        if memory.held is None:
-            memory.held = subject.applied_force
-        subject.applied_force = memory.held
-
-    def watch(self, subject: Measurement, memory: Memory) -> None:
-        """Hold the last force."""
-        memory.held = subject.applied_force
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,23 +78,15 @@ class ForceZero(AvionicsFault):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ChiefFreeze(AvionicsFault):
+class ChiefFreeze(TelemetryFreeze):
     """The chief's state told before is repeated; the first one where there was none."""
+
+    field = "chief_state"
 
     @property
     def words(self) -> str:
         """Of the ephemeris."""
         return "chief's ephemeris frozen"
-
-    def alter(self, subject: Measurement, memory: Memory, elapsed: float) -> None:
-        """Repeat the state held."""
-        if memory.held is None:
-            memory.held = subject.chief_state
-        subject.chief_state = memory.held
-
-    def watch(self, subject: Measurement, memory: Memory) -> None:
-        """Hold the last state."""
-        memory.held = subject.chief_state
 
 
 @dataclass(frozen=True, kw_only=True)
