@@ -127,7 +127,8 @@ class RecoveryTrajectory:
         Without cross-track thruster that motion is left out. No trajectory starts at an error out of reach, nor soon
         after one.
         """
-        self.state, self._transfer, self.planned, self._kept = None, None, NO_THRUST, 0
+        self._drop()
+        self.planned = NO_THRUST
         controlled = np.tile([True, True, bool(limit[2] > 0.0)], 2)
         state = np.where(controlled, error, 0.0)
         if self._pause > 0 or not (np.isfinite(state).all() and limit[1] > 0.0):
@@ -164,7 +165,11 @@ class RecoveryTrajectory:
 
     def end(self) -> None:
         """Drop the trajectory, as after ticks that were not regulated."""
-        self.state, self._transfer, self._pause, self._kept = None, None, 0, 0
+        self._drop()
+        self._pause = 0
+
+    def _drop(self) -> None:
+        self.state, self._transfer, self._kept = None, None, 0
 
     def acceleration(self) -> Vector:
         """(3,) acceleration for this tick, m/s^2; zero without a trajectory, and at its end."""
@@ -172,7 +177,7 @@ class RecoveryTrajectory:
         if transfer is None or self.state is None:
             return NO_THRUST
         if transfer.left < 0.5 * self._tick:
-            self.state, self._transfer, self._kept = None, None, 0
+            self._drop()
             return NO_THRUST
         phi, gamma = self._step or self._middle_step(transfer.time)
         transfer.costate = np.asarray(np.linalg.solve(phi.T, transfer.costate), dtype=np.float64)
