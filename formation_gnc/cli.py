@@ -52,22 +52,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     if arguments is None:
         arguments = sys.argv[1:]
-    # Import only the command that runs: the libraries of plots and reports take long to load.
-    for name in arguments[:1] if set(arguments[:1]) & set(COMMANDS) else COMMANDS:
-        command = import_module(f"formation_gnc.commands.{name}")
-        doc = (command.__doc__ or "").strip()
-        subparser = commands.add_parser(
-            name,
-            help=doc.splitlines()[0].rstrip("."),
-            description=doc,
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-        )
-        command.add_arguments(subparser)
-        subparser.set_defaults(run=command.run)
-    options = parser.parse_args(arguments)
     # SIGTERM ends a run as Ctrl-C does: all processes stop and the bag is closed.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
+        # Import only the command that runs: the libraries of plots and reports take long to load.
+        for name in arguments[:1] if set(arguments[:1]) & set(COMMANDS) else COMMANDS:
+            command = import_module(f"formation_gnc.commands.{name}")
+            doc = (command.__doc__ or "").strip()
+            subparser = commands.add_parser(
+                name,
+                help=doc.splitlines()[0].rstrip("."),
+                description=doc,
+                formatter_class=argparse.RawDescriptionHelpFormatter,
+            )
+            command.add_arguments(subparser)
+            subparser.set_defaults(run=command.run)
+        options = parser.parse_args(arguments)
         return int(options.run(options))
     except ConfigurationError as error:
         print(f"formation-gnc: {' '.join(str(error).split())}", file=sys.stderr)

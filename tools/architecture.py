@@ -14,7 +14,7 @@ WINGS = {
     "physics": ("orbit", "relative", "sensors", "plant"),
     "flight": ("flight", "navigation", "guidance", "control", "supervision"),
     "data": ("recording", "interchange", "analysis"),
-    "simulation": ("sil", "campaign"),
+    "simulation": ("sil", "campaign", "testing"),
     "shell": ("transport", "nodes", "commands", "cli"),
 }
 """Folders and modules of each wing, from the bottom up; all other modules of the root are the foundation."""

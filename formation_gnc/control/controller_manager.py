@@ -10,7 +10,7 @@ import numpy as np
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
 from formation_gnc.control.dead_band import is_tolerated
 from formation_gnc.control.registry import ALGORITHMS
-from formation_gnc.errors import ParameterError
+from formation_gnc.errors import ConfigurationError, DesignError, ParameterError
 from formation_gnc.flight.module import Configuration, FlightModule, ModuleParameters
 from formation_gnc.parameters import parameter, per_entry
 from formation_gnc.records import EventKind, NavigationState, Status, Target, Thrust
@@ -79,10 +79,15 @@ class ControllerManager(FlightModule[ControllerParameters, Controller[Any]]):
         """Whether the law was silent, within the dead band, at the tick before."""
 
     def design(self, parameters: ControllerParameters) -> Controller[Any]:
-        """Design the law named by `algorithm`; raises DesignError as that law."""
+        """Design the law named by `algorithm`; raises DesignError as that law, whatever the law raises."""
         law = ALGORITHMS[parameters.algorithm]
         vehicle = Vehicle(parameters.mass, np.array(parameters.thrust_limit))
-        return law(parameters.laws[parameters.algorithm], parameters, vehicle)
+        try:
+            return law(parameters.laws[parameters.algorithm], parameters, vehicle)
+        except ConfigurationError:
+            raise
+        except Exception as error:  # a law may be a plug-in's
+            raise DesignError(f"{parameters.algorithm}: cannot be designed: {type(error).__name__}: {error}") from error
 
     def activate(
         self,
@@ -129,14 +134,16 @@ class ControllerManager(FlightModule[ControllerParameters, Controller[Any]]):
         if self._is_silent:
             self._withheld = [0.0, 0.0, 0.0]
             return Command(np.zeros(3), solver="dead band")
-        if was_silent:
-            law.activate(Handover(np.zeros(3), self.parameters.algorithm))
         try:
+            if was_silent:
+                law.activate(Handover(np.zeros(3), self.parameters.algorithm))
             command = law.command(estimate, target)
-        except (ArithmeticError, ValueError) as error:  # LinAlgError is a ValueError
+            wanted = command.force.tolist()
+            is_finite = len(wanted) == 3 and all(map(isfinite, wanted))
+        except Exception as error:  # a law may be a plug-in's: whatever it raises, the flight goes on
             return Command(np.zeros(3), fallback=f"{type(error).__name__}: {error}: no thrust")
-        if not all(map(isfinite, command.force.tolist())):
-            return Command(np.zeros(3), fallback="command not finite: no thrust")
+        if not is_finite:
+            return Command(np.zeros(3), fallback="command is not three finite forces: no thrust")
         return command
 
     def _limit_step(self, time: int, wanted: list[float]) -> list[float]:

@@ -14,6 +14,7 @@ from formation_gnc.control.mpc import ModelPredictiveController
 from formation_gnc.control.mpsp import MpspController
 from formation_gnc.control.sdre import Sdre
 from formation_gnc.control.sdre_finite import FiniteSdre
+from formation_gnc.plugins import load_plugins
 
 ALGORITHMS: dict[str, type[Controller[Any]]] = {
     "coast": Coast,
@@ -27,6 +28,7 @@ ALGORITHMS: dict[str, type[Controller[Any]]] = {
     "asre": Asre,
     "adaptive_lqr": AdaptiveLinearQuadraticRegulator,
 }
+ALGORITHMS.update(load_plugins("laws", Controller, ALGORITHMS))
 
 FINITE_HORIZONS = [name for name, law in ALGORITHMS.items() if issubclass(law, FiniteHorizonController)]
 """The laws that complete a reconfiguration at a given final time."""

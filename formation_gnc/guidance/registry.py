@@ -13,6 +13,7 @@ from formation_gnc.guidance.relative_orbit import RelativeOrbit
 from formation_gnc.guidance.slot_list import SlotList
 from formation_gnc.guidance.tetrahedral import Tetrahedral
 from formation_gnc.guidance.three_in_plane_one_out import ThreeInPlaneOneOut
+from formation_gnc.plugins import load_plugins
 
 FORMATIONS: dict[str, type[Formation[Any]]] = {
     "leader_follower": LeaderFollower,
@@ -26,3 +27,4 @@ FORMATIONS: dict[str, type[Formation[Any]]] = {
     "moving_plane": MovingPlane,
     "slot_list": SlotList,
 }
+FORMATIONS.update(load_plugins("formations", Formation, FORMATIONS))

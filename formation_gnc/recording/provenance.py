@@ -6,6 +6,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import formation_gnc
+from formation_gnc.plugins import plugin_versions
 
 LOST = "lost messages"
 """Name of the metadata record with the number of lost messages by topic."""
@@ -35,6 +36,7 @@ def provenance() -> dict[str, dict[str, str]]:
             "commit": commit(),
             "python": platform.python_version(),
             **{package: version(package) for package in PACKAGES},
+            **plugin_versions(),
         }
     }
 

@@ -6,6 +6,7 @@ predict with time-invariant linear ones, targets move by linear ones in closed f
 ones. So a new model is offered wherever it can serve.
 """
 
+from formation_gnc.plugins import load_plugins
 from formation_gnc.relative.gim_alfriend import GimAlfriendModel
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.j2_gradient import J2GradientModel
@@ -30,3 +31,4 @@ MODELS: dict[str, type[RelativeModel]] = {
     "nonlinear_j2": OblateModel,  # in filters, which integrate both satellites
 }
 """By the name that scenarios give; two models go by two names each."""
+MODELS.update(load_plugins("models", RelativeModel, MODELS))

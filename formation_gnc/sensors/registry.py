@@ -1,13 +1,15 @@
 """All sensors by name: a new sensor is one file and one line here.
 
 Schemas and kernels are made from the registry when their modules are imported. A sensor from outside the package
-therefore registers before `formation_gnc.plant`, `navigation` or `sensors.kernels` are imported.
+is therefore a plug-in (`formation_gnc.plugins`), or registers before `formation_gnc.plant`, `navigation` or
+`sensors.kernels` are imported.
 """
 
 from collections.abc import Mapping
 from types import MappingProxyType
 
 from formation_gnc.errors import ConfigurationError
+from formation_gnc.plugins import load_plugins
 from formation_gnc.sensors.chief_range import CHIEF_RANGE
 from formation_gnc.sensors.latitude import LATITUDE
 from formation_gnc.sensors.radius import RADIUS
@@ -44,3 +46,9 @@ def sensors() -> Mapping[str, Sensor]:
     global _in_use
     _in_use = True
     return MappingProxyType(_SENSORS)
+
+
+for _name, _sensor in load_plugins("sensors", Sensor, _SENSORS):
+    if _sensor.name != _name:
+        raise ConfigurationError(f"plug-in {_name}: its sensor's name is {_sensor.name!r}; both must be the same")
+    register(_sensor)
