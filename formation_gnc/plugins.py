@@ -24,7 +24,7 @@ def _declared() -> tuple[EntryPoint, ...]:
     return tuple(found[key] for key in sorted(found))
 
 
-def load_plugins[T](kind: str, base: type[T], taken: Iterable[str]) -> Iterator[tuple[str, Any]]:
+def load_plugins(kind: str, base: type, taken: Iterable[str]) -> Iterator[tuple[str, Any]]:
     """Plug-ins of a registry by name, in order of name.
 
     Args:

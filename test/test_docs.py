@@ -7,7 +7,7 @@ import pytest
 
 from tools.architecture import ROOT
 
-PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
+PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/**/*.md")])
 FOLDERS = ("formation_gnc", "test", "tools", "bench", "verification", "launch")
 SOURCES = [path.as_posix() for folder in FOLDERS for path in (ROOT / folder).rglob("*.py")]
 TEST = re.compile(r"^ *def (test_\w+)", re.MULTILINE)

@@ -84,13 +84,12 @@ def formation_gnc(environment: dict[str, str], *arguments: Any) -> subprocess.Co
     return subprocess.run([*command, *map(str, arguments)], env=environment, capture_output=True, text=True)
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize("way", [("--in-process",), pytest.param((), marks=pytest.mark.sil)])
-def test_the_law_of_the_example_is_swapped_to_in_flight_and_replays(way, example, tmp_path):
+@pytest.mark.sil
+def test_the_law_of_the_example_is_swapped_to_in_flight_and_replays(example, tmp_path):
     pytest.importorskip("rclpy")
     swap = "controller.schedule=['{at: 20.0, algorithm: pd, pd.damping: 0.7}']"
     options = ("--duration", 40, "--set", swap, "--bag", tmp_path / "bag", "--json")
-    flown = formation_gnc(example, "sil", "leader_follower", *way, *options)
+    flown = formation_gnc(example, "sil", "leader_follower", *options)
     assert flown.returncode == 0, flown.stderr
     assert json.loads(flown.stdout)["misses"] == 0
     replayed = formation_gnc(example, "replay", tmp_path / "bag", "--bag", tmp_path / "again")

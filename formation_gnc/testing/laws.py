@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from numpy.typing import ArrayLike
 
 from formation_gnc.control.controller_manager import ControllerManager, ControllerParameters
 from formation_gnc.control.registry import FINITE_HORIZONS
@@ -46,7 +47,9 @@ def manager_of(algorithm: str, **values: Any) -> ControllerManager:
     return ControllerManager("controller", load(ControllerParameters, {"algorithm": algorithm} | basis | own))
 
 
-def estimate_of(state: Vector, time: float = 0.0, mass: float = 100.0, chief: Vector | None = None) -> NavigationState:
+def estimate_of(
+    state: ArrayLike, time: float = 0.0, mass: float = 100.0, chief: Vector | None = None
+) -> NavigationState:
     """Estimate of a relative state (6,), m and m/s, at a time (s)."""
     return NavigationState(
         time=round(time * NANOSECONDS),
@@ -57,11 +60,11 @@ def estimate_of(state: Vector, time: float = 0.0, mass: float = 100.0, chief: Ve
 
 
 def target_of(
-    state: Vector | None = None,
+    state: ArrayLike | None = None,
     time: float = 0.0,
     preview: Vector | None = None,
     step: float = 60.0,
-    eclipses: Matrix = NO_ECLIPSES,
+    eclipses: Any = NO_ECLIPSES,
     neighbours: Matrix = NO_NEIGHBOURS,
 ) -> Target:
     """Target at a time (s), optionally with preview, eclipses (s) and neighbours."""
