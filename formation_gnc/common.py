@@ -9,6 +9,7 @@ from formation_gnc.orbit.constants import MU
 from formation_gnc.orbit.elements import Elements
 from formation_gnc.parameters import parameter
 from formation_gnc.types import NANOSECONDS
+from formation_gnc.units import EPOCH_UNIT
 
 LAST_SECOND = 2**31 - 1
 """Largest time (s) that the stamp of a message holds."""
@@ -43,11 +44,11 @@ class CommonParameters:
     )
     epoch: float = parameter(
         0.0,
-        unit="s",
+        unit=EPOCH_UNIT,
         minimum=FIRST_EPOCH,
         maximum=LAST_EPOCH,
-        doc="Terrestrial Time at the start of the run since J2000.0; it places Sun, Moon and Greenwich, whose series "
-        "hold from 1950 to 2050",
+        doc="Terrestrial Time at the start of the run, or a date in UTC, as 2026-11-28T12:00:00Z; it places Sun, Moon "
+        "and Greenwich, whose series hold from 1950 to 2050",
     )
 
     def __post_init__(self) -> None:

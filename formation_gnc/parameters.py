@@ -16,9 +16,10 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 import yaml
 
-from formation_gnc.errors import ParameterError, nearest
+from formation_gnc.errors import ConfigurationError, ParameterError, nearest
 from formation_gnc.parameter_yaml import ParameterLoader
 from formation_gnc.records import ParameterChange
+from formation_gnc.units import to_si
 
 OWN_OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides")
 """Prefixes of parameters that every ROS node may have besides its schema."""
@@ -128,14 +129,27 @@ class Leaf:
             ParameterError: the value is not allowed.
         """
         value = _plain(value)
+        units = self.limits.unit.split(", ")
         if get_origin(self.type) is not tuple:
-            return self._check_scalar(value, self.type)
+            return self._check_scalar(self._in_si(value, self.type, units[0]), self.type)
         if not _is_list(value):
             raise self._rejection(value, f"a list ({self.type_name})")
-        values = tuple(self._check_scalar(_plain(item), get_args(self.type)[0]) for item in value)
+        kind, count = get_args(self.type)[0], len(value)
+        in_si = [self._in_si(_plain(item), kind, units[i * len(units) // count]) for i, item in enumerate(value)]
+        values = tuple(self._check_scalar(item, kind) for item in in_si)
         if self.limits.length is not None and len(values) != self.limits.length:
             raise self._rejection(list(value), self.limits.allowed())
         return values
+
+    def _in_si(self, value: Any, kind: type, unit: str) -> Any:
+        """A number given as text with its unit, in SI; anything else as it is."""
+        if not (kind is float and isinstance(value, str)):
+            return value
+        try:
+            converted = to_si(value, unit)
+        except ConfigurationError as error:
+            raise ParameterError(f"parameter {self.name}: {value!r}: {error}") from None
+        return value if converted is None else converted
 
     def _check_scalar(self, value: Any, kind: type) -> Any:
         if isinstance(value, int) and not -(2**63) <= value < 2**63:

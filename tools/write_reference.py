@@ -47,6 +47,8 @@ INTRODUCTION = f"""\
 
 Every parameter of every node, from the schemas that the nodes themselves check by. SI units and radians.
 
+- A number may be given as text with its unit: `97.4 deg`, `700 km`, `40 uN`, `1 mm/s`, `1.5 h`; in a list, then,
+  all of them. `epoch` may be a date in UTC: `2026-11-28T12:00:00Z`.
 - What is not given has its default; what has none must be given. `DEPUTY` stands for each name in `deputies`.
 - A parameter whose default is the plant's has the value that the plant has in the same file; so do those of every
   node. One that is given another value keeps it, and a warning at the start says both.
@@ -54,7 +56,10 @@ Every parameter of every node, from the schemas that the nodes themselves check 
 - A parameter that may change in flight does so at the first tick after it was set (`ros2 param set`), or at
   the one that `schedule` foresees. Any other is rejected once the node runs.
 
-A scenario is one ROS 2 parameter file for all nodes: `params/leader_follower.yaml` shows how.
+A scenario is one ROS 2 parameter file for all nodes: `params/leader_follower.yaml` shows how. With
+`extends: leader_follower`, a key beside the nodes, it holds only what differs from that scenario or file;
+`formation-gnc` reads it so, while ROS itself takes no such key. `formation-gnc check SCENARIO` shows the values that
+result, where each comes from, and what to think of before the flight.
 """
 
 FAULTS_INTRODUCTION = f"""

@@ -1,3 +1,3 @@
 """Subcommands of `formation-gnc`, a module each: a docstring for the help, `add_arguments` and `run`."""
 
-COMMANDS = ("sil", "set", "design", "navigate", "replay", "compare", "report", "view", "export", "recover")
+COMMANDS = ("sil", "check", "set", "design", "navigate", "replay", "compare", "report", "view", "export", "recover")

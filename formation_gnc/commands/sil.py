@@ -20,11 +20,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from formation_gnc.control.registry import ALGORITHMS
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.plant.plant import Plant
 from formation_gnc.sil.overrides import overrides_of
-from formation_gnc.sil.path_demand import path_demand_warnings
-from formation_gnc.sil.process_noise import process_noise_warnings
-from formation_gnc.sil.recovery_forecast import recovery_warnings
+from formation_gnc.sil.preflight import warnings
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import Scenario, duration_of, load_scenario
 
@@ -86,17 +83,8 @@ def run(options: argparse.Namespace) -> int:
     bag = options.bag or _free_directory(scenario.name)
     if bag.exists():
         raise ConfigurationError(f"bag {bag}: exists already; name a directory that does not")
-    Plant(scenario.plant)  # rejects what cannot be flown, before any warning
     console = Console(stderr=True, highlight=False)
-    ignored = [f"parameter {name}, given to all nodes: ignored, since none has it" for name in scenario.ignored]
-    noted = [
-        *ignored,
-        *scenario.departures(),
-        *process_noise_warnings(scenario),
-        *path_demand_warnings(scenario),
-        *recovery_warnings(scenario),
-    ]
-    for warning in noted:
+    for warning in warnings(scenario):
         console.print(f"warning: {warning}", soft_wrap=True)
     on_graph = partial(_fly_on_graph, composed=options.composed, display=options.display)
     try:

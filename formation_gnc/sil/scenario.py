@@ -26,6 +26,9 @@ SECTION = "ros__parameters"
 ALL = "**"
 """Pattern of all nodes: what it gives a node that has no such parameter is another's, as every node has it."""
 
+EXTENDS = "extends"
+"""Key of the scenario that a file extends: its sections come first, and what the file gives goes before them."""
+
 RUN_NODES = (PLANT, "/recorder", "/display", "/replay")
 """Nodes that are one per run, some only when asked."""
 
@@ -160,6 +163,19 @@ def find_scenario(name: str) -> Path:
     raise ConfigurationError(f"scenario {name}: unknown; it must be a parameter file or one of {', '.join(known)}")
 
 
+def sources(name: str, overrides: Mapping[str, Mapping[str, Any]], node: str) -> dict[str, str]:
+    """File or "command line" that each parameter of a node comes from, by dotted name; none for a default."""
+    found: dict[str, str] = {}
+    for path in reversed(_extended(find_scenario(name))):
+        for pattern, section in _read(path)[1]:
+            if matches(pattern, node):
+                found |= dict.fromkeys(section, f"{path.stem} {pattern}")
+    for pattern, section in overrides.items():
+        if matches(f"/{ALL}/*" if pattern.strip("/") == ALL else pattern, node):
+            found |= dict.fromkeys(section, "command line")
+    return found
+
+
 def given_to(path: Path, node: str, deputies: Sequence[str]) -> dict[str, Any]:
     """What a parameter file gives a node of a run with these deputies, by dotted name.
 
@@ -239,16 +255,37 @@ def matches(pattern: str, node: str) -> bool:
 
 
 def _sections(path: Path) -> Sections:
-    """Node patterns of a parameter file with their parameters by dotted name, in the file's order."""
+    """Node patterns of a parameter file with their parameters by dotted name: those it extends, then its own."""
+    return [section for each in reversed(_extended(path)) for section in _read(each)[1]]
+
+
+def _extended(path: Path) -> list[Path]:
+    """A scenario's file, the one that it extends, and so on."""
+    chain = [path]
+    while (base := _read(chain[-1])[0]) is not None:
+        beside = chain[-1].parent / base
+        try:
+            found = beside if base.endswith((".yaml", ".yml")) and beside.is_file() else find_scenario(base)
+        except ConfigurationError as error:
+            raise ConfigurationError(f"{chain[-1]}: {EXTENDS}: {error}") from None
+        if any(found.samefile(each) for each in chain):
+            raise ConfigurationError(f"{path}: {EXTENDS} {base}: goes in a circle")
+        chain.append(found)
+    return chain
+
+
+def _read(path: Path) -> tuple[str | None, Sections]:
+    """Name of the scenario that a file extends, if any, and its own sections in their order."""
     try:
-        return list(_parsed(path, path.read_bytes()))
+        base, sections = _parsed(path, path.read_bytes())
     except OSError as error:
         raise ConfigurationError(f"{path}: cannot be read ({error.strerror})") from None
+    return base, list(sections)
 
 
 @lru_cache(maxsize=4)
-def _parsed(path: Path, content: bytes) -> Sections:
-    """Sections of a parameter file; a node asks for its own and for the plant's of the same file."""
+def _parsed(path: Path, content: bytes) -> tuple[str | None, Sections]:
+    """A parameter file's base and sections; a node asks for its own and for the plant's of the same file."""
     try:
         document = read_yaml(content.decode())
     except RejectedYamlError as error:
@@ -257,7 +294,10 @@ def _parsed(path: Path, content: bytes) -> Sections:
         raise ConfigurationError(f"{path}: not YAML ({' '.join(str(error).split())})") from None
     if not isinstance(document, dict):
         raise ConfigurationError(f"{path}: not a ROS 2 parameter file; it must map node names to {SECTION}")
-    return list(_walk(path, document, ""))
+    base = document.get(EXTENDS)
+    if base is not None and not isinstance(base, str):
+        raise ConfigurationError(f"{path}: {EXTENDS}: {base!r} is not allowed; it must name a scenario or its file")
+    return base, list(_walk(path, {name: each for name, each in document.items() if name != EXTENDS}, ""))
 
 
 def _walk(path: Path, tree: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, dict[str, Any]]]:
