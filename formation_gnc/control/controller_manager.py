@@ -102,13 +102,17 @@ class ControllerManager(FlightModule[ControllerParameters, Controller[Any]]):
         """Thrust for the tick that begins at the estimate's stamp, and the controller's status."""
         self.begin_tick(estimate.time)
         command = self._evaluate(estimate, target)
-        wanted, limit = command.force.tolist(), self.parameters.thrust_limit
-        force = self._limit_step(estimate.time, within(wanted, limit))
-        self._record_fallback(estimate.time, command.fallback)
-        self._force = np.array(force)
+        parameters = self.parameters
+        wanted, limit = command.force.tolist(), parameters.thrust_limit
+        force = within(wanted, limit)
+        if self._predecessor is not None or any(self._withheld):
+            force = self._limit_step(estimate.time, force)
+        if command.fallback != self._fallback:
+            self._record_fallback(estimate.time, command.fallback)
+        self._force = command.force if force == wanted else np.array(force)
         return Thrust(estimate.time, self._force), Status(
             estimate.time,
-            self.parameters.algorithm,
+            parameters.algorithm,
             command.force,
             [abs(value) > largest for value, largest in zip(wanted, limit, strict=True)],
             command.solver,
@@ -127,16 +131,16 @@ class ControllerManager(FlightModule[ControllerParameters, Controller[Any]]):
         if not 0.0 < estimate.mass < inf:
             reason = f"mass is {estimate.mass:g} kg; it must be positive and finite: no thrust"
             return Command(np.zeros(3), fallback=reason)
-        error = (estimate.relative_state - target.relative_state).tolist()
-        law, was_silent = self.configuration.design, self._is_silent
-        band, rate = self.parameters.dead_band, self.parameters.mean_motion
-        self._is_silent = is_tolerated(error, band, rate, was_silent)
-        if self._is_silent:
-            self._withheld = [0.0, 0.0, 0.0]
-            return Command(np.zeros(3), solver="dead band")
+        parameters, law, was_silent = self.parameters, self.configuration.design, self._is_silent
+        if was_silent or all(parameters.dead_band):
+            error = (estimate.relative_state - target.relative_state).tolist()
+            self._is_silent = is_tolerated(error, parameters.dead_band, parameters.mean_motion, was_silent)
+            if self._is_silent:
+                self._withheld = [0.0, 0.0, 0.0]
+                return Command(np.zeros(3), solver="dead band")
         try:
             if was_silent:
-                law.activate(Handover(np.zeros(3), self.parameters.algorithm))
+                law.activate(Handover(np.zeros(3), parameters.algorithm))
             command = law.command(estimate, target)
             wanted = command.force.tolist()
             is_finite = len(wanted) == 3 and all(map(isfinite, wanted))
@@ -148,8 +152,6 @@ class ControllerManager(FlightModule[ControllerParameters, Controller[Any]]):
 
     def _limit_step(self, time: int, wanted: list[float]) -> list[float]:
         """Bound the step in force at a handover, and release what earlier handovers withheld."""
-        if self._predecessor is None and not any(self._withheld):
-            return wanted
         limit = self.parameters.thrust_limit
         step = [self.parameters.handover_step * largest for largest in limit]
         if self._predecessor is not None:
@@ -164,10 +166,9 @@ class ControllerManager(FlightModule[ControllerParameters, Controller[Any]]):
         return within(_minus(wanted, self._withheld), limit)
 
     def _record_fallback(self, time: int, reason: str) -> None:
-        """Record an event when a fallback begins, changes or ends."""
-        if reason != self._fallback:
-            self.log(time, EventKind.FALLBACK, reason or "over", self.parameters.algorithm)
-            self._fallback = reason
+        """Record an event of a fallback that begins, changes or ends."""
+        self.log(time, EventKind.FALLBACK, reason or "over", self.parameters.algorithm)
+        self._fallback = reason
 
 
 def within(values: Sequence[float], limits: Sequence[float]) -> list[float]:

@@ -94,6 +94,7 @@ class LinearQuadraticRegulator(Controller[LqrParameters]):
         model = self._model = DESIGN_MODELS[parameters.model](common)
         self.tick = common.tick
         self._limit, self._mass = vehicle.thrust_limit, vehicle.mass
+        self._limit_of_mass = self._mass, self._limit / self._mass
         self._recovery = RecoveryTrajectory(model, common.tick)
         self._integrates = parameters.integrates
         self._feed_forward = FeedForward(parameters.feed_forward, model)
@@ -113,6 +114,8 @@ class LinearQuadraticRegulator(Controller[LqrParameters]):
                 self._design_along_orbit(parameters, model, weights)
         except DesignError as error:
             raise DesignError(f"lqr: {error}") from error
+        self._rows = None if len(self.gains) else self.gain.tolist()
+        """Rows of a constant gain."""
 
     def _design_time_invariant(self, parameters: LqrParameters, model: RelativeModel, weights: Weights) -> None:
         if parameters.gain == "continuous":
@@ -188,18 +191,20 @@ class LinearQuadraticRegulator(Controller[LqrParameters]):
             self._start = estimate.time
         error = estimate.relative_state - target.relative_state
         feed_forward, reason = self._feed_forward(estimate, target)
-        time = estimate.time
-        if len(self.gains) and not self._finite:
-            time = round(self._model.time_at(estimate.chief_state, time / NANOSECONDS) * NANOSECONDS)
-        rows, free = self.gain_at(time).tolist(), feed_forward.tolist()
+        time, mass, rows, free = estimate.time, estimate.mass, self._rows, feed_forward.tolist()
+        if rows is None:
+            if not self._finite:
+                time = round(self._model.time_at(estimate.chief_state, time / NANOSECONDS) * NANOSECONDS)
+            rows = self.gain_at(time).tolist()
+        if self._limit_of_mass[0] != mass:
+            self._limit_of_mass = mass, self._limit / mass
 
         def feedback(off: Vector) -> Vector:
             state = off.tolist() + self._integral
             return np.array([push - sumprod(row, state) for row, push in zip(rows, free, strict=True)])
 
-        limit = self._limit / estimate.mass
-        acceleration, off = self._recovery.regulate(error, limit, time / NANOSECONDS, feedback)
-        force = estimate.mass * acceleration
+        acceleration, off = self._recovery.regulate(error, self._limit_of_mass[1], time / NANOSECONDS, feedback)
+        force = mass * acceleration
         if self._integrates:
             self._integral = integrated(
                 self._integral, off[:3].tolist(), force.tolist(), self._limit.tolist(), self.tick

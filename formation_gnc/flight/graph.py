@@ -155,8 +155,10 @@ class ModuleInstance:
     def collect(self, records: Mapping[str, Any]) -> Sequence[Any] | None:
         """Its inputs at a tick, of the records there are by topic; None while it cannot answer."""
         if not self.inputs_of_others:
-            present = [records[topic] for topic in self.inputs if topic in records]
-            return present if len(present) == len(self.inputs) else None
+            try:
+                return [records[topic] for topic in self.inputs]
+            except KeyError:
+                return None
         inputs: Sequence[Any] | None = None
         for topic in (*self.inputs_of_others, *reversed(self.inputs)):  # the pacing topic last
             if topic in records:
@@ -166,8 +168,9 @@ class ModuleInstance:
     def respond(self, inputs: Sequence[Any]) -> list[tuple[str, Any]]:
         """Answer a tick: full topic name and record of each output there is."""
         answer = self.module.on_tick(*inputs)
-        given = answer if isinstance(answer, tuple) else (answer,)
-        return [(name, record) for name, record in zip(self.outputs, given, strict=True) if record is not None]
+        if not isinstance(answer, tuple):
+            return [] if answer is None else [(self.outputs[0], answer)]
+        return [each for each in zip(self.outputs, answer, strict=True) if each[1] is not None]
 
     def take_events(self) -> list[Event]:
         """The module's events since they were last taken."""

@@ -47,6 +47,8 @@ RETURN = 1.2
 REPORTED_AGAIN = 2.0
 """Change of the standard deviation, as a factor, after which it is reported again."""
 
+_IDENTITY = np.eye(6)
+
 _LARGEST = 1e9
 """Innovations are cut to so many standard deviations, whose squares are finite."""
 
@@ -198,7 +200,7 @@ class AdaptiveNoise:
         update_contributions(
             self._contributions, places, MEMORY, self._transition, covariance, jacobian, readings.variance
         )
-        self._transition = np.eye(6)
+        self._transition = _IDENTITY.copy()
         for name in readings.model.sensors:
             sensor = self._sensors[name]
             if sensor.factor > 1.0 or sensor.is_noisy(FALSE_ALARM):

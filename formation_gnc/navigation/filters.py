@@ -1,11 +1,12 @@
-"""Kalman filters over the relative state in the Hill frame, by FilterPy."""
+"""Kalman filters over the relative state in the Hill frame; the unscented one by FilterPy."""
 
 from collections.abc import Callable
 from functools import cache, lru_cache
-from math import sqrt
+from math import isfinite, sqrt
 from typing import Any, Protocol
 
 import numpy as np
+from scipy.linalg import inv
 
 from formation_gnc.navigation.kernels.linear_algebra import innovation_variances, restore_definiteness
 from formation_gnc.navigation.measurement import Readings
@@ -16,7 +17,7 @@ from formation_gnc.types import Matrix, Vector
 
 @cache
 def filterpy() -> Any:
-    """FilterPy's filters, imported at the first call: their two seconds are for navigation nodes alone."""
+    """FilterPy's filters, imported at the first call: their two seconds are for who flies the unscented one."""
     import filterpy.kalman
 
     return filterpy.kalman
@@ -49,7 +50,6 @@ class ExtendedFilter:
     def __init__(self, state: Vector, covariance: Matrix) -> None:
         """Start from a relative state (6,) and its covariance (6, 6)."""
         self.state, self.covariance = state, covariance
-        self._filter = filterpy().ExtendedKalmanFilter(dim_x=6, dim_z=3)
 
     def predict(self, process: ProcessModel, interval: Interval, noise: Matrix) -> Matrix:
         """Predict with the process model, which gives F P F' + Q too."""
@@ -64,7 +64,10 @@ class ExtendedFilter:
         return innovation, innovation_variances(jacobian, self.covariance, readings.variance), jacobian
 
     def update(self, pseudo: bool) -> float:
-        """FilterPy's update, in units of standard deviations: m^2 and rad^2 are too far apart to invert together."""
+        """Update in units of standard deviations: m^2 and rad^2 are too far apart to invert together.
+
+        In the order of operations of FilterPy's `ExtendedKalmanFilter`, with the same bits.
+        """
         readings, innovation, expected, jacobian = self._linearized
         variance = readings.variance
         if pseudo:
@@ -79,13 +82,18 @@ class ExtendedFilter:
         else:
             noise = _identity(len(variance))
         scale = np.sqrt(variance)
-        jacobian = jacobian / scale[:, None]
-        inner = self._filter
-        inner.x, inner.P = self.state, self.covariance
-        inner.update(innovation / scale, lambda _: jacobian, lambda _: 0.0, R=noise)
-        restore_definiteness(inner.P)
-        self.state, self.covariance = inner.x, inner.P
-        return float(inner.y @ inner.SI @ inner.y)
+        jacobian, residual = jacobian / scale[:, None], innovation / scale
+        cross = self.covariance.dot(jacobian.T)
+        spread = jacobian.dot(cross) + noise
+        if not isfinite(spread.sum()):
+            raise ArithmeticError("the update is not finite")
+        inverse = inv(spread, check_finite=False)
+        gain = cross.dot(inverse)
+        kept = _identity(6) - gain.dot(jacobian)
+        covariance = kept.dot(self.covariance).dot(kept.T) + gain.dot(noise).dot(gain.T)
+        restore_definiteness(covariance)
+        self.state, self.covariance = self.state + gain.dot(residual), covariance
+        return float(residual @ inverse @ residual)
 
 
 class UnscentedFilter:
@@ -157,3 +165,9 @@ FILTERS: dict[str, Callable[[Vector, Matrix], RelativeFilter]] = {
     "ukf": UnscentedFilter,
 }
 """Filters by name."""
+
+
+def load(name: str) -> None:
+    """Import what a filter needs, before a tick waits for it."""
+    if FILTERS[name] is UnscentedFilter:
+        filterpy()

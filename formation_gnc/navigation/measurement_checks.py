@@ -176,7 +176,6 @@ def is_plausible_mass(mass: float) -> bool:
     return isfinite(mass) and mass > LEAST_MASS
 
 
-def is_plausible_acceleration(acceleration: Vector) -> bool:
-    """Whether an acceleration (3,), m/s^2, can be a thruster's."""
-    x, y, z = acceleration.tolist()
-    return bool(x * x + y * y + z * z <= LARGEST_ACCELERATION**2)  # false for NaN
+def is_plausible_acceleration(x: float, y: float, z: float) -> bool:
+    """Whether an acceleration (m/s^2, by axis) can be a thruster's."""
+    return x * x + y * y + z * z <= LARGEST_ACCELERATION**2  # false for NaN

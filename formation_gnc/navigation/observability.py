@@ -130,8 +130,8 @@ class Observability:
 
     def propagate(self, transition: Matrix, duration: float) -> bool:
         """Propagate by a transition matrix (6, 6) over a duration, s; returns whether a window has ended."""
-        self.direction = self._propagated(self.direction, transition)
-        linear_algebra.accumulate_transition(self.transition, transition)
+        self.direction = self.direction.copy()  # estimates hold the old one
+        motion.propagate_window(self.direction, self.transition, transition, self._mean_motion)
         self._elapsed += duration
         if self._elapsed < self._window:
             return False

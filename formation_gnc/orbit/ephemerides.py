@@ -33,7 +33,8 @@ class Ephemerides:
     def __init__(self, sun_at: Place, moon_at: Place) -> None:
         """Take positions from functions."""
         self._places = (sun_at, moon_at)
-        self._is_series = sun_at is sun and moon_at is moon
+        self.is_series = sun_at is sun and moon_at is moon
+        """Whether both are the compiled series, without a table."""
         self._table = (NO_TABLE, 0)
 
     def table(self, begin: float, end: float) -> tuple[Array, int]:
@@ -49,7 +50,7 @@ class Ephemerides:
         Raises:
             ConfigurationError: a time that the ephemerides do not cover.
         """
-        if not self._is_series:
+        if not self.is_series:
             first, last = floor(begin / SEGMENT), floor(end / SEGMENT)
             table, start = self._table
             if first < start or last >= start + len(table):

@@ -138,6 +138,8 @@ class Propagator:
         self._environment = environment or forces.environment()
         self._ephemerides = Ephemerides(self._environment.sun, self._environment.moon)
         self._has_density_model = callable(self._environment.density)
+        self._is_constant = not self._has_density_model and self._ephemerides.is_series
+        """Whether the packed environment is the same at all times."""
         self._table = self._ephemerides.table(epoch, epoch + tick)  # raises for an epoch that is not covered
         self._packed = self._environment.packed(*self._table)
 
@@ -191,6 +193,8 @@ class Propagator:
 
     def _packed_at(self, begin: float, step: float, states: Array | None = None) -> Array:
         """Packed environment over a step from a time, s since J2000.0, with the air about satellites that coast."""
+        if self._is_constant:
+            return self._packed
         table = self._ephemerides.table(begin, begin + step)
         if table is not self._table:
             self._table, self._packed = table, self._environment.packed(*table)

@@ -1,7 +1,7 @@
 """Truth of a run: chief and deputies, their thrusters and their sensors."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -73,6 +73,8 @@ class Plant:
         self._forces = np.zeros((len(self._states), 3))
         """Thrust applied over the previous tick, (N, 3), Hill frame at its start, N."""
         self._satellites = [self._satellite(name, parameters.deputy[name]) for name in parameters.deputies]
+        self._masses = np.array([parameters.chief_body.mass, *(each.state.mass for each in self._satellites)])
+        """(N,) at the start of the tick, kg."""
         self._faults = FaultInjection(parameters.planned_faults, parameters.seed)
         self._committed: PlantParameters | None = None
         self._propagator = Propagator(
@@ -152,27 +154,29 @@ class Plant:
         Raises:
             ImpactError: a satellite has come down.
         """
-        applied: list[Sequence[float]] = [NO_FORCE]
-        masses = [self.parameters.chief_body.mass]
+        applied, masses = np.zeros((len(self._states), 3)), self._masses
         missed = []
-        for satellite in self._satellites:
-            command = forces.get(satellite.name)
-            masses.append(satellite.state.mass)
+        for index, satellite in enumerate(self._satellites, 1):
+            command, before = forces.get(satellite.name), satellite.state
             commanded = NO_FORCE if command is None else command.tolist()
-            force, satellite.state, denied = (
-                satellite.thruster.apply(commanded, satellite.eclipse, satellite.state)
+            force, after, denied = (
+                satellite.thruster.apply(commanded, satellite.eclipse, before)
                 if satellite.faults is None
-                else satellite.faults.fire(satellite.thruster, commanded, satellite.eclipse, satellite.state, self.time)
+                else satellite.faults.fire(satellite.thruster, commanded, satellite.eclipse, before, self.time)
             )
-            applied.append(force)
+            applied[index] = force
+            satellite.state = after
+            if after.mass != before.mass:
+                if self._masses is masses:
+                    self._masses = masses.copy()
+                self._masses[index] = after.mass
             satellite.missed = command is None or Denial.NOT_FINITE in denied
             if satellite.missed:
                 missed.append(satellite.name)
             if denied != satellite.denied:
                 self._note(satellite, denied)
-        self._forces = np.array(applied)
-        seconds = self.time / NANOSECONDS
-        self._states = self._propagator.propagate_with_thrust(seconds, self._states, self._forces, np.array(masses))
+        self._forces = applied
+        self._states = self._propagator.propagate_with_thrust(self.time / NANOSECONDS, self._states, applied, masses)
         self.tick += 1
         self.time += self.parameters.tick_ns
         self.finished = self.tick == self.parameters.ticks

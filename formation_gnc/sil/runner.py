@@ -42,9 +42,11 @@ class Run:
             inputs = instance.collect(records)
             if inputs is not None:
                 for topic, record in instance.respond(inputs):
-                    publish(topic, record)
-            for event in instance.take_events():
-                sink(topics.EVENTS.name, event)
+                    records[topic] = record
+                    sink(topic, record)
+            if instance.module.events:
+                for event in instance.take_events():
+                    sink(topics.EVENTS.name, event)
         for deputy, topic in self._commands.items():
             if topic in records:
                 self.simulation.answer(deputy, records[topic])

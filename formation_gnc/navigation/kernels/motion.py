@@ -169,12 +169,9 @@ def change_chief(chief: Vector, state: Vector, other: Vector) -> Vector:
     return to_relative(other_axes, other_rate, other, to_inertial(axes, rate, chief, state))
 
 
-@kernel((WRITABLE_VECTOR, ANY_MATRIX, float64))
-def propagate_direction(direction: Vector, transition: Matrix, mean_motion: float) -> None:
-    """Multiply a direction (6,) by a transition matrix (6, 6), and normalise it.
-
-    A direction is a relative state of unit length, its rates divided by the mean motion (rad/s).
-    """
+@inline
+def _propagate_direction(direction: Vector, transition: Matrix, mean_motion: float) -> None:
+    """`propagate_direction` for use inside kernels."""
     moved = np.zeros(6)
     for i in range(6):
         for k in range(3):
@@ -185,3 +182,19 @@ def propagate_direction(direction: Vector, transition: Matrix, mean_motion: floa
         square += moved[i] * moved[i] + moved[3 + i] * moved[3 + i]
     for i in range(6):
         direction[i] = moved[i] / sqrt(square) if square > 0.0 else moved[i]
+
+
+@kernel((WRITABLE_VECTOR, ANY_MATRIX, float64))
+def propagate_direction(direction: Vector, transition: Matrix, mean_motion: float) -> None:
+    """Multiply a direction (6,) by a transition matrix (6, 6), and normalise it.
+
+    A direction is a relative state of unit length, its rates divided by the mean motion (rad/s).
+    """
+    _propagate_direction(direction, transition, mean_motion)
+
+
+@kernel((WRITABLE_VECTOR, WRITABLE_MATRIX, ANY_MATRIX, float64))
+def propagate_window(direction: Vector, total: Matrix, transition: Matrix, mean_motion: float) -> None:
+    """`propagate_direction`, and multiply a transition matrix (6, 6) since earlier by the next one, in one call."""
+    _propagate_direction(direction, transition, mean_motion)
+    total[:] = product(transition, total)
