@@ -201,7 +201,7 @@ class LinearQuadraticRegulator(Controller[LqrParameters]):
 
         def feedback(off: Vector) -> Vector:
             state = off.tolist() + self._integral
-            return np.array([push - sumprod(row, state) for row, push in zip(rows, free, strict=True)])
+            return np.array([push - sumprod(row, state) for row, push in zip(rows, free)])  # noqa: B905 - three each
 
         acceleration, off = self._recovery.regulate(error, self._limit_of_mass[1], time / NANOSECONDS, feedback)
         force = mass * acceleration

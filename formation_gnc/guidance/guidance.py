@@ -92,18 +92,18 @@ class Guidance(FlightModule[GuidanceParameters, TargetPath]):
             neighbours: estimates of `self.neighbours` at the same stamp; None for one that is missing.
         """
         self.begin_tick(estimate.time)
-        self._neighbour_states = {
-            name: each
-            for name, each in zip(self.neighbours, neighbours, strict=True)
-            if each is not None and _is_plausible(each)
-        }
+        if neighbours:
+            self._neighbour_states = {
+                name: each
+                for name, each in zip(self.neighbours, neighbours, strict=True)
+                if each is not None and _is_plausible(each)
+            }
         if self._slots.is_due:
             self._assign_slot(estimate)
         parameters = self.parameters
-        ahead = _ahead(parameters.preview_step, parameters.preview_steps)
-        time = estimate.time / NANOSECONDS
-        path = self.configuration.design.anchored(estimate.chief_state, time)
-        states = path.states(time + ahead)
+        preview_step, ahead = _preview(parameters.preview_step, parameters.preview_steps)
+        path = self.configuration.design
+        states = path.states_ahead(estimate.chief_state, estimate.time / NANOSECONDS, ahead)
         if self._new_target is not None:
             self._report_target(self._new_target, estimate, states[0])
             self._new_target = None
@@ -111,14 +111,14 @@ class Guidance(FlightModule[GuidanceParameters, TargetPath]):
             estimate.time,
             parameters.formation,
             states[0],
-            round(parameters.preview_step * NANOSECONDS),
+            preview_step,
             states[1:],
             self._eclipses.intervals(estimate.time, estimate.chief_state, parameters),
             np.array([each.relative_state for each in self._neighbour_states.values()])
             if self._neighbour_states
             else NO_NEIGHBOURS,
         )
-        return target, self._predict_separation(estimate, target)
+        return target, self._predict_separation(estimate, target) if neighbours else None
 
     def check_staged(self, staged: GuidanceConfiguration) -> None:
         """Reject a new target while a reconfiguration is under way, for one deputy alone where slots are assigned
@@ -239,12 +239,14 @@ class Guidance(FlightModule[GuidanceParameters, TargetPath]):
 
 
 @lru_cache(maxsize=16)
-def _ahead(step: float, steps: int) -> Vector:
-    """(1 + steps,) times (s) of a target and its preview from the tick on."""
-    ahead: Vector = step * np.arange(steps + 1.0)
-    return ahead
+def _preview(step: float, steps: int) -> tuple[int, Vector]:
+    """Step (ns) of a preview, and times (s) of a target and its preview from the tick on, (1 + steps,)."""
+    return round(step * NANOSECONDS), step * np.arange(steps + 1.0)
 
 
 def _is_plausible(estimate: NavigationState) -> bool:
     """Whether state and mass are finite, and possible for a satellite in formation."""
-    return bool((np.abs(estimate.relative_state) < MAX_RANGE).all() and 0.0 < estimate.mass < math.inf)
+    for each in estimate.relative_state.tolist():  # numbers: a sixth of the time of an array
+        if not -MAX_RANGE < each < MAX_RANGE:
+            return False
+    return 0.0 < estimate.mass < math.inf

@@ -53,6 +53,13 @@ class TargetPath(ABC):
         path.__dict__.update(self.__dict__, _chief=chief, _chief_time=time)
         return path
 
+    def states_ahead(self, chief: Vector, time: float, ahead: Vector) -> Matrix:
+        """(N, 6) states at times (N,) s after a time (s), as `anchored` to the chief's inertial state (6,) then."""
+        times = time + ahead
+        if not _is_on_ellipse(chief):
+            return self.states(times)
+        return hill_from_curvilinear(self.curvilinear(times), chief, times - time, MU)
+
     def states(self, times: Vector) -> Matrix:
         """(N, 6) target states, Hill frame, m and m/s, at times (N,) in s since the start of the run."""
         return hill_from_curvilinear(self.curvilinear(times), self._chief, times - self._chief_time, MU)
@@ -124,7 +131,7 @@ class HillPath(TargetPath):
 
     def curvilinear(self, times: Vector) -> Matrix:
         """(N, 6) states of the formation."""
-        return self._formation.states(np.asarray(times) + self._ahead)
+        return self._formation.states(times + self._ahead)
 
     def _transitions(self, time: float, ahead: Vector) -> Matrix:
         transitions: Matrix = HillModel(self._common.mean_motion).transition(0.0, ahead)
@@ -166,6 +173,10 @@ class ModelPath(TargetPath):
     def curvilinear(self, times: Vector) -> Matrix:
         """(N, 6) states by the model's transition matrices."""
         return self._transitions(0.0, times) @ self._start
+
+    def states_ahead(self, chief: Vector, time: float, ahead: Vector) -> Matrix:
+        """With the same constants of motion about the orbit that the chief is seen on."""
+        return self.anchored(chief, time).states(time + ahead)
 
     def anchored(self, chief: Vector, time: float) -> Self:
         """With the same constants of motion about the orbit that the chief is seen on."""

@@ -18,10 +18,12 @@ class ChiefTracker:
         self.state = ephemeris
         self.is_lost = False
         """Whether the state is propagated, because the ephemeris is missing or not plausible."""
-        self._ephemeris = ephemeris
+        self._ephemeris = self._last = ephemeris
 
     def advance(self, ephemeris: Vector | None, step: StepConstants) -> Vector:
         """Take the ephemeris (6,) at the end of a step, or propagate where there is none or it jumped."""
+        if ephemeris is not None:
+            self._last, self._ephemeris = self._ephemeris, ephemeris
         if ephemeris is not None and _agrees(self.state, ephemeris, step):
             self.state, self.is_lost = ephemeris, False
         else:
@@ -29,19 +31,16 @@ class ChiefTracker:
             self.is_lost = True
         return self.state
 
-    def resume(self, ephemeris: Vector, step: StepConstants) -> bool:
+    def resume(self, step: StepConstants) -> bool:
         """Return to an ephemeris that jumped, once it has moved on along an orbit from its last value.
 
         Args:
-            ephemeris: at the end of the step (6,).
             step: constants of a tick.
 
         Returns:
             Whether it has, and `state` is the ephemeris again.
         """
-        last, self._ephemeris = self._ephemeris, ephemeris
-        if not self.is_lost:
-            return False
+        last, ephemeris = self._last, self._ephemeris
         if is_plausible_chief(last) and is_plausible_chief(ephemeris) and _agrees(last, ephemeris, step):
             self.state, self.is_lost = ephemeris, False
             return True

@@ -187,7 +187,8 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         if gap < step.nanoseconds:
             step = step_constants(gap, self.parameters.acceleration_density)
         self._predict_step(state, measurement.chief_state, self._acceleration(state, measurement), step)
-        self._track_chief(state, measurement)
+        if state.chief.is_lost:
+            self._resume_chief(state)
         if not are_finite(state.filter.state, state.filter.covariance):
             raise ArithmeticError("the prediction is not finite")
 
@@ -217,14 +218,14 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         self._rejections.add(Rejection.AVIONICS, "applied force")
         return _NO_ACCELERATION
 
-    def _track_chief(self, state: FilterState, measurement: Measurement) -> None:
+    def _resume_chief(self, state: FilterState) -> None:
         """Reject an ephemeris that jumped, until it has moved on along an orbit."""
         propagated = state.chief.state
-        if state.chief.resume(measurement.chief_state, self.configuration.design.step):
+        if state.chief.resume(self.configuration.design.step):
             relative = change_chief(propagated, state.filter.state, state.chief.state)
             state.filter = FILTERS[self.parameters.filter](relative, state.filter.covariance)
             self.log(state.time, EventKind.CHIEF, "ephemeris goes on from elsewhere: taken up again")
-        elif state.chief.is_lost:
+        else:
             self._rejections.add(Rejection.CHIEF, "chief ephemeris")
 
     def _estimate(self, state: FilterState, measurement: Measurement, status: EstimateStatus) -> Estimate | None:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from formation_gnc.errors import OrbitError
 from formation_gnc.orbit.elements import Elements
+from formation_gnc.relative.kernels import harmonic_transition, sine_lag
 from formation_gnc.relative.model import NO_THRUST, ON_THE_CHIEF, Array, LinearModel
 
 
@@ -67,27 +68,11 @@ class HarmonicModel(LinearModel):
         w, q, p = self.frequencies
         t = np.asarray(duration, dtype=np.float64)
         sine, cosine, versine, lag = _circular_functions(q * t)
-        normal_sine, normal_cosine, _, _ = _circular_functions(p * t)
-        g = 4.0 * w**2 - q**2
-        phi = np.zeros((*t.shape, 6, 6))
-        phi[..., 0, 0] = 1.0 + g * versine / q**2
-        phi[..., 0, 3] = sine / q
-        phi[..., 0, 4] = 2.0 * w * versine / q**2
-        phi[..., 1, 0] = -2.0 * w * g * lag / q**3
-        phi[..., 1, 1] = 1.0
-        phi[..., 1, 3] = -2.0 * w * versine / q**2
-        phi[..., 1, 4] = t - 4.0 * w**2 * lag / q**3
-        phi[..., 2, 2] = normal_cosine
-        phi[..., 2, 5] = normal_sine / p
-        phi[..., 3, 0] = g * sine / q
-        phi[..., 3, 3] = cosine
-        phi[..., 3, 4] = 2.0 * w * sine / q
-        phi[..., 4, 0] = -2.0 * w * g * versine / q**2
-        phi[..., 4, 3] = -2.0 * w * sine / q
-        phi[..., 4, 4] = 1.0 - 4.0 * w**2 * versine / q**2
-        phi[..., 5, 2] = -p * normal_sine
-        phi[..., 5, 5] = normal_cosine
-        return phi
+        normal_sine, normal_cosine = (sine, cosine) if p == q else (np.sin(p * t), np.cos(p * t))
+        phi = np.empty((t.size, 6, 6))
+        functions = sine, cosine, versine, lag, normal_sine, normal_cosine
+        harmonic_transition(phi, (w, q, p), (w**2, q**2, q**3), *(np.ravel(each) for each in (t, *functions)))
+        return phi.reshape(*t.shape, 6, 6)
 
     def transitions(self, time: float, durations: Array) -> Array:
         """(N, 6, 6) state transition matrices over durations (N,), s, in one call."""
@@ -155,7 +140,6 @@ def _circular_functions(angle: Array) -> tuple[Array, Array, Array, Array]:
     Over a tick their terms agree to ten digits, which a subtraction would lose.
     """
     sine = np.sin(angle)
-    square = angle**2
-    series = angle * square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0 * (1.0 - square / 72.0)))
-    lag = np.where(np.abs(angle) < 0.1, series, angle - sine)
+    lag = np.empty(np.shape(angle))
+    sine_lag(np.ravel(angle), np.ravel(angle**2), np.ravel(sine), lag.reshape(-1))
     return sine, np.cos(angle), 2.0 * np.sin(0.5 * angle) ** 2, lag

@@ -1,9 +1,9 @@
-"""The nonlinear equations of relative motion and their Jacobian at one state, compiled."""
+"""Arithmetic of relative-motion models, compiled."""
 
 from math import sqrt
 
 import numpy as np
-from numba import float64
+from numba import float64, types
 from numpy.typing import NDArray
 
 from formation_gnc.orbit.constants import EARTH_RADIUS, J2
@@ -71,3 +71,65 @@ def _motion(state: Array, acceleration: Array, frame: Array, pole: Array) -> Arr
                 + 2.0 * pole[i] * pole[j]
             )
     return joint
+
+
+@kernel((ANY_VECTOR, ANY_VECTOR, ANY_VECTOR, float64[::1]))
+def sine_lag(angle: Array, square: Array, sine: Array, out: Array) -> None:
+    """Fill in a - sin a for angles a (N,), without cancellation, from their squares and sines (N,)."""
+    for k in range(len(angle)):
+        a, aa = angle[k], square[k]
+        series = a * aa / 6.0 * (1.0 - aa / 20.0 * (1.0 - aa / 42.0 * (1.0 - aa / 72.0)))
+        out[k] = series if abs(a) < 0.1 else a - sine[k]
+
+
+@kernel((float64[:, :, ::1], *(types.UniTuple(float64, 3),) * 2, *(ANY_VECTOR,) * 7))
+def harmonic_transition(
+    out: Array,
+    frequencies: tuple[float, float, float],
+    powers: tuple[float, float, float],
+    time: Array,
+    sine: Array,
+    cosine: Array,
+    versine: Array,
+    lag: Array,
+    normal_sine: Array,
+    normal_cosine: Array,
+) -> None:
+    """Fill in transition matrices (N, 6, 6) of `formation_gnc.relative.hill.HarmonicModel`.
+
+    Args:
+        out: written.
+        frequencies: w, q and p, rad/s.
+        powers: w^2, q^2 and q^3.
+        time: durations t (N,), s.
+        sine: sin q t, (N,); `cosine`, `versine` (1 - cos) and `lag` (q t - sin q t) likewise.
+        cosine: see above.
+        versine: see above.
+        lag: see above.
+        normal_sine: sin p t, (N,).
+        normal_cosine: cos p t, (N,).
+    """
+    w, q, p = frequencies
+    ww, qq, qqq = powers
+    twice = 2.0 * w
+    g = 4.0 * ww - qq
+    out[:] = 0.0
+    for k in range(len(time)):
+        phi = out[k]
+        phi[0, 0] = 1.0 + g * versine[k] / qq
+        phi[0, 3] = sine[k] / q
+        phi[0, 4] = twice * versine[k] / qq
+        phi[1, 0] = -twice * g * lag[k] / qqq
+        phi[1, 1] = 1.0
+        phi[1, 3] = -phi[0, 4]
+        phi[1, 4] = time[k] - 4.0 * ww * lag[k] / qqq
+        phi[2, 2] = normal_cosine[k]
+        phi[2, 5] = normal_sine[k] / p
+        phi[3, 0] = g * sine[k] / q
+        phi[3, 3] = cosine[k]
+        phi[3, 4] = twice * sine[k] / q
+        phi[4, 0] = -twice * g * versine[k] / qq
+        phi[4, 3] = -phi[3, 4]
+        phi[4, 4] = 1.0 - 4.0 * ww * versine[k] / qq
+        phi[5, 2] = -p * normal_sine[k]
+        phi[5, 5] = normal_cosine[k]
