@@ -29,6 +29,8 @@ class Design:
     """Of the noise of each value of a reading, by sensor in use."""
     gate: float
     """Largest accepted innovation squared over its variance."""
+    coasting_after: int
+    """Time (ns) without a used reading after which the filter counts as coasting."""
     silent_after: int
     """Time (ns) without a valid reading after which a sensor in use is reported."""
 

@@ -85,7 +85,7 @@ class ExtendedFilter:
         jacobian, residual = jacobian / scale[:, None], innovation / scale
         cross = self.covariance.dot(jacobian.T)
         spread = jacobian.dot(cross) + noise
-        if not isfinite(spread.sum()):
+        if not isfinite(spread.trace()):
             raise ArithmeticError("the update is not finite")
         inverse = inv(spread, check_finite=False)
         gain = cross.dot(inverse)

@@ -66,6 +66,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
             step_constants(parameters.tick_ns, parameters.acceleration_density),
             {name: tuple(each**2 for each in sigma) for name, sigma in parameters.sigmas.items()},
             parameters.gate**2,
+            round(parameters.coasting_after * NANOSECONDS),
             round(SILENT_AFTER * parameters.coasting_after * NANOSECONDS),
         )
 
@@ -254,7 +255,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         if status is EstimateStatus.TRACKING:
             if state.chief.is_lost:
                 status = EstimateStatus.CHIEF_LOST
-            elif state.time - state.last_reading > self.parameters.coasting_after * NANOSECONDS:
+            elif state.time - state.last_reading > self.configuration.design.coasting_after:
                 status = EstimateStatus.COASTING
         # Positional: keyword arguments take twice as long.
         return Estimate(
