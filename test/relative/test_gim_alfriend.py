@@ -13,7 +13,8 @@ from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import hill_transform, hill_transform_inverse, relative_from_inertial
 from formation_gnc.orbit.propagation import propagate_with_transition
 from formation_gnc.relative.chief import KeplerChief
-from formation_gnc.relative.gim_alfriend import GimAlfriendModel, sigma
+from formation_gnc.relative.element_differences import sigma
+from formation_gnc.relative.gim_alfriend import GimAlfriendModel
 from formation_gnc.relative.model import RelativeModel
 from formation_gnc.relative.oblate import OblateModel
 from formation_gnc.relative.tschauner_hempel import TschaunerHempelModel
