@@ -9,13 +9,20 @@ singularity at the critical inclination.
 Derivation: docs/theory/orbits.md.
 """
 
+from dataclasses import replace
 from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from formation_gnc.orbit.constants import EARTH_RADIUS, J2, MU
-from formation_gnc.orbit.elements import Elements, elements_from_state, state_from_elements
+from formation_gnc.orbit.elements import (
+    Elements,
+    elements_from_state,
+    state_from_elements,
+    true_from_mean_anomaly,
+    wrap,
+)
 
 Array = NDArray[np.float64]
 
@@ -35,12 +42,12 @@ def osculating_elements(mean: Elements) -> Elements:
 
 
 def mean_state(osculating: Array) -> Array:
-    """Inertial state of the mean orbit, (6,), of an osculating inertial state, (6,), m and m/s."""
+    """Inertial states of the mean orbits, (..., 6), of osculating inertial states, (..., 6), m and m/s."""
     return _flow(osculating, -1.0)
 
 
 def osculating_state(mean: Array) -> Array:
-    """Osculating inertial state, (6,), of the mean orbit's inertial state, (6,), m and m/s."""
+    """Osculating inertial states, (..., 6), of the mean orbits' inertial states, (..., 6), m and m/s."""
     return _flow(mean, 1.0)
 
 
@@ -60,8 +67,20 @@ def secular_rates(mean: Elements) -> tuple[float, float, float]:
     )
 
 
+def advanced(mean: Elements, duration: float) -> Elements:
+    """Mean elements after a duration (s) at their secular rates under J2."""
+    node, perigee, anomaly = (rate * duration for rate in secular_rates(mean))
+    e = mean.eccentricity
+    return replace(
+        mean,
+        right_ascension=wrap(mean.right_ascension + node),
+        argument_of_perigee=wrap(mean.argument_of_perigee + perigee),
+        true_anomaly=true_from_mean_anomaly(mean.mean_anomaly + anomaly, e),
+    )
+
+
 def _generating_function(states: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """W of states (6, K), m^2/s; analytic, for differentiation by complex steps."""
+    """W of states (6, ...), m^2/s; analytic, for differentiation by complex steps."""
     rx, ry, rz, vx, vy, vz = states
     r = np.sqrt(rx * rx + ry * ry + rz * rz)
     h = np.sqrt((ry * vz - rz * vy) ** 2 + (rz * vx - rx * vz) ** 2 + (rx * vy - ry * vx) ** 2)
@@ -82,14 +101,14 @@ def _generating_function(states: NDArray[np.complex128]) -> NDArray[np.complex12
 
 
 def _velocity(state: Array) -> Array:
-    """Hamiltonian vector field of W at a state (6,)."""
+    """Hamiltonian vector field of W at states (..., 6)."""
     steps = 1e-30 * np.array([1e7, 1e7, 1e7, 1e4, 1e4, 1e4])
-    slopes = _generating_function(state[:, None] + 1j * np.diag(steps)).imag / steps
-    return np.concatenate((slopes[3:], -slopes[:3]))
+    slopes = _generating_function(np.moveaxis(state[..., None] + 1j * np.diag(steps), -2, 0)).imag / steps
+    return np.concatenate((slopes[..., 3:], -slopes[..., :3]), axis=-1)
 
 
 def _flow(state: Array, duration: float) -> Array:
-    """State after a time along the flow, by two classical Runge-Kutta steps: errors are of order J2^5."""
+    """States after a time along the flow, by two classical Runge-Kutta steps: errors are of order J2^5."""
     now, step = np.array(state, dtype=np.float64), 0.5 * duration
     for _ in range(2):
         first = _velocity(now)

@@ -7,6 +7,7 @@ ones. So a new model is offered wherever it can serve.
 """
 
 from formation_gnc.plugins import load_plugins
+from formation_gnc.relative.elements_model import RelativeElementsModel
 from formation_gnc.relative.gim_alfriend import GimAlfriendModel
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.j2_gradient import J2GradientModel
@@ -25,6 +26,7 @@ MODELS: dict[str, type[RelativeModel]] = {
     "j2_mean_motion": J2MeanMotionModel,
     "tschauner_hempel": TschaunerHempelModel,
     "yamanaka_ankersen": TschaunerHempelModel,  # by the authors of its transition matrix
+    "relative_elements": RelativeElementsModel,
     "gim_alfriend": GimAlfriendModel,
     "nonlinear": NonlinearModel,
     "oblate": OblateModel,

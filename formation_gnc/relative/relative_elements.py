@@ -15,6 +15,7 @@ matrices say. A chief without a node (within a milliradian of the equator) has n
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from formation_gnc.errors import OrbitError
 from formation_gnc.orbit.elements import (
@@ -25,7 +26,7 @@ from formation_gnc.orbit.elements import (
     wrap,
 )
 from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
-from formation_gnc.orbit.mean import mean_state, osculating_state, secular_rates
+from formation_gnc.orbit.mean import advanced, mean_state, osculating_state, secular_rates
 from formation_gnc.relative.element_differences import (
     check_node,
     secular_slopes,
@@ -123,22 +124,23 @@ def hill_matrix(chief: Elements) -> Array:
     return matrix
 
 
-def near_circular_matrix(latitude: float, mean_motion: float) -> Array:
-    """(6, 6) map from relative elements, m, to the relative state, Hill frame, about a near-circular chief.
+def near_circular_matrix(latitude: ArrayLike, mean_motion: float) -> Array:
+    """(..., 6, 6) maps from relative elements, m, to the relative state, Hill frame, about a near-circular chief.
 
-    Neglects the chief's eccentricity, and with it needs no node: `latitude` (rad) counts from wherever the elements do.
+    Neglects the chief's eccentricity, and with it needs no node: latitudes (...,) (rad) count from wherever the
+    elements do.
     """
-    sine, cosine, n = math.sin(latitude), math.cos(latitude), mean_motion
-    return np.array(
-        [
-            [1.0, 0.0, -cosine, -sine, 0.0, 0.0],
-            [0.0, 1.0, 2.0 * sine, -2.0 * cosine, 0.0, 0.0],
-            [0.0, 0.0, 0.0, 0.0, sine, -cosine],
-            [0.0, 0.0, n * sine, -n * cosine, 0.0, 0.0],
-            [-1.5 * n, 0.0, 2.0 * n * cosine, 2.0 * n * sine, 0.0, 0.0],
-            [0.0, 0.0, 0.0, 0.0, n * cosine, n * sine],
-        ]
-    )
+    sine, cosine, n = np.sin(latitude), np.cos(latitude), mean_motion
+    matrix = np.zeros((*np.shape(latitude), 6, 6))
+    matrix[..., 0, 0] = matrix[..., 1, 1] = 1.0
+    matrix[..., 4, 0] = -1.5 * n
+    matrix[..., 0, 2], matrix[..., 0, 3] = -cosine, -sine
+    matrix[..., 1, 2], matrix[..., 1, 3] = 2.0 * sine, -2.0 * cosine
+    matrix[..., 2, 4], matrix[..., 2, 5] = sine, -cosine
+    matrix[..., 3, 2], matrix[..., 3, 3] = n * sine, -n * cosine
+    matrix[..., 4, 2], matrix[..., 4, 3] = 2.0 * n * cosine, 2.0 * n * sine
+    matrix[..., 5, 4], matrix[..., 5, 5] = n * cosine, n * sine
+    return matrix
 
 
 def near_circular_elements(latitude: float, mean_motion: float, state: Array) -> Array:
@@ -200,6 +202,43 @@ def drag_response(chief: Elements, duration: float) -> Array:
     response[3] = kept * duration * math.cos(later) - e * math.sin(later) * slopes[3]
     response[4] = kept * duration * math.sin(later) + e * math.cos(later) * slopes[3]
     return np.asarray(np.linalg.solve(_differences(chief), response))
+
+
+def drifted(chief: Elements, relative: Array, duration: float) -> Array:
+    """(6,) mean relative elements, m, after a duration, s, under J2: as `j2_transition`, at any separation.
+
+    Args:
+        chief: its mean elements at the start.
+        relative: (6,) mean relative elements at the start, m.
+        duration: s.
+    """
+    deputy = deputy_elements(chief, relative)
+    node, perigee, anomaly = np.subtract(secular_rates(deputy), secular_rates(chief)).tolist()
+    later = [advanced(orbit, duration) for orbit in (chief, deputy)]
+    (chief_x, chief_y), (deputy_x, deputy_y) = (_eccentricity_vector(orbit) for orbit in later)
+    a, gone = chief.semi_major_axis, chief.semi_major_axis * duration
+    moved = np.array(relative, dtype=np.float64)
+    moved[1] += gone * (perigee + anomaly + node * math.cos(chief.inclination))
+    moved[2:4] = a * (deputy_x - chief_x), a * (deputy_y - chief_y)
+    moved[5] += gone * node * math.sin(chief.inclination)
+    return moved
+
+
+def with_drift(chief: Elements, relative: Array, rate: float = 0.0) -> Array:
+    """(6,) mean relative elements, m, with the da by which dlambda drifts at a rate (m/s) under J2.
+
+    Args:
+        chief: its mean elements.
+        relative: (6,), m; da is replaced.
+        rate: of dlambda, m/s.
+    """
+    result = np.array(relative, dtype=np.float64)
+    for _ in range(20):  # Newton's method with the slope without J2
+        change = (drifted(chief, result, 1.0)[1] - result[1] - rate) / (1.5 * chief.mean_motion)
+        result[0] += change
+        if abs(change) < 1e-9:
+            break
+    return result
 
 
 def least_separation(relative: Array) -> float:

@@ -183,7 +183,7 @@ def test_parallel_vectors_keep_the_smaller_of_both():
     parallel = np.array([0.0, 500.0, 0.0, 300.0, 0.0, 400.0])
     assert least_separation(parallel) == pytest.approx(300.0)
     assert least_separation(parallel * [1, 1, 1, 1, 1, -1]) == pytest.approx(300.0)
-    assert least_separation(parallel + [20.0, 0, 0, 0, 0, 0]) == pytest.approx(280.0)
+    assert least_separation(parallel + np.array([20.0, 0, 0, 0, 0, 0])) == pytest.approx(280.0)
     perpendicular = np.array([0.0, 0.0, 300.0, 0.0, 0.0, 400.0])
     assert least_separation(perpendicular) == 0.0
     assert least_separation(np.zeros(6)) == 0.0
@@ -197,7 +197,7 @@ def test_a_chief_without_a_node_is_rejected_by_name(inclination):
         lambda: deputy_elements(chief, np.zeros(6)),
         lambda: hill_matrix(chief),
     ):
-        with pytest.raises(OrbitError, match="inclination is .*: relative elements need a node"):
+        with pytest.raises(OrbitError, match=r"inclination is .*: relative elements need a node"):
             fails()
 
 
