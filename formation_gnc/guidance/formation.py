@@ -46,6 +46,10 @@ class Formation[P](ABC):
         In the coordinates of Hill's equations, which at large separations are curvilinear.
         """
 
+    def elements(self, phase: float) -> Vector | None:
+        """(6,) mean relative elements at time zero, m, at a phase (rad); None for a formation not given by them."""
+        return None
+
     def about(self, chief: Vector) -> "Formation[P]":
         """The formation about a chief with an inertial state (6,) at time zero: itself, where it is a shape."""
         return self

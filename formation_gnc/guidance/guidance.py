@@ -19,7 +19,7 @@ from formation_gnc.guidance.reconfiguration import (
     leaves_target,
     transfer_to,
 )
-from formation_gnc.guidance.separation import SeparationMonitor, describe, predict
+from formation_gnc.guidance.separation import SeparationMonitor, describe, least_from_track, predict
 from formation_gnc.guidance.slots import MAX_RANGE, SlotAssigner, check_assignment, design_path
 from formation_gnc.guidance.targets import TargetPath
 from formation_gnc.parameters import to_json
@@ -201,6 +201,8 @@ class Guidance(FlightModule[GuidanceParameters, TargetPath]):
                 f"at {size:.3g} m from the chief",
                 parameters.formation,
             )
+        if parameters.safe_distance > 0.0:
+            self._report_safety(estimate, target)
         transfer = transfer_to(target, estimate, parameters) if new.previous_formation else None
         if transfer is None:
             return
@@ -209,6 +211,19 @@ class Guidance(FlightModule[GuidanceParameters, TargetPath]):
             kind = EventKind.INFEASIBLE
             detail += f", above the {parameters.reconfiguration_time:g} s allowed"
         self.log(estimate.time, kind, detail, parameters.formation)
+
+    def _report_safety(self, estimate: NavigationState, target: Vector) -> None:
+        """Warn of a target that comes too near the chief's track, where an along-track error would be a collision."""
+        parameters = self.parameters
+        nearest = least_from_track(target, estimate.chief_state, parameters.mean_motion)
+        if nearest < parameters.safe_distance:
+            self.log(
+                estimate.time,
+                EventKind.WARNING,
+                f"not passively safe: {nearest:.3g} m from the chief's track across the flight direction, below "
+                f"safe_distance, {parameters.safe_distance:g} m",
+                parameters.formation,
+            )
 
     def _predict_separation(self, estimate: NavigationState, target: Target) -> Separation | None:
         """The predicted separation when one is due; logs an event when a warning begins or ends."""

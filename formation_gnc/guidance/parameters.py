@@ -56,6 +56,14 @@ class GuidanceParameters(ModuleParameters):
         in_flight=True,
         doc="predicted distance to another satellite of the fleet below which an event warns; 0 for none",
     )
+    safe_distance: float = parameter(
+        0.0,
+        unit="m",
+        minimum=0.0,
+        in_flight=True,
+        doc="distance from the chief's track, across the flight direction, below which an event warns that a new "
+        "target is not passively safe; 0 for none",
+    )
     separation_interval: float = parameter(
         60.0, unit="s", above=0.0, in_flight=True, doc="time between predictions of the separations in the fleet"
     )

@@ -68,7 +68,7 @@ def _locked(until: int) -> str:
 
 def leaves_target(changes: Mapping[str, Any]) -> bool:
     """Whether changes leave the target as it is, whatever their values."""
-    return all(name == "schedule" or name.startswith("separation_") for name in changes)
+    return all(name == "schedule" or name.startswith(("separation_", "safe_")) for name in changes)
 
 
 def is_same_target(old: GuidanceConfiguration, new: GuidanceConfiguration, time: int) -> bool:

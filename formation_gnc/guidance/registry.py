@@ -9,6 +9,7 @@ from formation_gnc.guidance.helix import Helix
 from formation_gnc.guidance.leader_follower import LeaderFollower
 from formation_gnc.guidance.moving_plane import MovingPlane
 from formation_gnc.guidance.projected_circular_orbit import ProjectedCircularOrbit
+from formation_gnc.guidance.relative_elements import RelativeElements
 from formation_gnc.guidance.relative_orbit import RelativeOrbit
 from formation_gnc.guidance.slot_list import SlotList
 from formation_gnc.guidance.tetrahedral import Tetrahedral
@@ -18,6 +19,7 @@ from formation_gnc.plugins import load_plugins
 FORMATIONS: dict[str, type[Formation[Any]]] = {
     "leader_follower": LeaderFollower,
     "relative_orbit": RelativeOrbit,
+    "relative_elements": RelativeElements,
     "projected_circular_orbit": ProjectedCircularOrbit,
     "general_circular_orbit": GeneralCircularOrbit,
     "three_in_plane_one_out": ThreeInPlaneOneOut,

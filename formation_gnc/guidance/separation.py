@@ -5,8 +5,14 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from formation_gnc.errors import OrbitError
 from formation_gnc.guidance.targets import TargetPath
 from formation_gnc.records import Separation, Target
+from formation_gnc.relative.relative_elements import (
+    least_separation,
+    mean_relative_elements,
+    near_circular_elements,
+)
 from formation_gnc.types import NANOSECONDS, Matrix, Vector
 
 POINTS = 60
@@ -74,6 +80,20 @@ def predict(
         passive_time=target.time + round(far[1] * NANOSECONDS),
         passive_neighbour=names[far[2]],
     )
+
+
+def least_from_track(state: Vector, chief: Vector, mean_motion: float) -> float:
+    """Least distance (m) from the chief's track, across the flight direction, in free motion near a circular chief.
+
+    Args:
+        state: (6,) relative, Hill frame, m and m/s.
+        chief: inertial state (6,), m and m/s, for mean elements; without an orbit or a node, Hill's equations count.
+        mean_motion: of the chief, rad/s.
+    """
+    try:
+        return least_separation(mean_relative_elements(chief, state))
+    except OrbitError:
+        return least_separation(near_circular_elements(0.0, mean_motion, state))
 
 
 def describe(separation: Separation) -> str:

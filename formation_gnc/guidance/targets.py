@@ -21,9 +21,12 @@ from formation_gnc.orbit.elements import (
     true_from_mean_anomaly,
 )
 from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
+from formation_gnc.orbit.mean import advanced, mean_elements, mean_state, osculating_state
+from formation_gnc.relative.elements_model import RelativeElementsModel
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.model import LinearModel
 from formation_gnc.relative.registry import MODELS
+from formation_gnc.relative.relative_elements import deputy_elements, drifted, mean_relative_elements, with_drift
 from formation_gnc.types import Matrix, Vector
 
 CHECKS = 24
@@ -199,8 +202,92 @@ class ModelPath(TargetPath):
         return super().error()
 
 
+class ElementsPath(ModelPath):
+    """Free motion under J2 by mean relative elements, at any separation and eccentricity.
+
+    The mean elements of chief and deputy drift at their secular rates; the target is the deputy that has the relative
+    elements of the time about the chief as it is seen, short-period perturbations of both included. Formations that
+    are not given by elements start as in `ModelPath`, without the drift that the linear model leaves.
+    """
+
+    def __init__(
+        self, model: type[LinearModel], formation: Formation[Any], phase: float, common: CommonParameters
+    ) -> None:
+        """Start at time zero; raises OrbitError for a chief without a node, or a deputy off any orbit."""
+        super().__init__(model, formation, phase, common)
+        self._first = mean_elements(common.chief_elements)
+        elements = self._formation.elements(phase)
+        if elements is None:
+            start = hill_from_curvilinear(self._start[None], self._chief, np.zeros(1), MU)[0]
+            elements = mean_relative_elements(self._chief, start)
+            if not self._formation.is_given:
+                elements = with_drift(self._first, elements, self._drift())
+        self._elements = elements
+        self._mean = self._first
+        """Mean elements of the chief at its time."""
+        deputy_elements(self._first, elements)
+
+    def _drift(self) -> float:
+        """Rate (m/s) at which the formation drifts along the track under Hill's equations."""
+        given = self._formation.states(np.array([self._ahead]))[0]
+        return -3.0 * float(given[4] + 2.0 * self._common.mean_motion * given[0])
+
+    def anchored(self, chief: Vector, time: float) -> Self:
+        """With the same relative elements about the mean orbit that the chief is seen on; the same without one."""
+        if not _is_on_ellipse(chief):
+            return self
+        try:
+            mean = elements_from_state(mean_state(chief))
+            deputy_elements(mean, drifted(self._first, self._elements, time))
+        except OrbitError:
+            return self
+        path = super(ModelPath, self).anchored(chief, time)
+        path._mean = mean
+        return path
+
+    def states(self, times: Vector) -> Matrix:
+        """(N, 6) target states, Hill frame, m and m/s."""
+        times = np.asarray(times, dtype=np.float64)
+        chiefs = [advanced(self._mean, time) for time in (times - self._chief_time).tolist()]
+        return _states_about(chiefs, [drifted(self._first, self._elements, time) for time in times.tolist()])
+
+    def coast(self, states: Matrix, time: float, ahead: Vector) -> Matrix:
+        """As `TargetPath.coast`, by the mean elements of each state; linear where one is on no orbit."""
+        chief = advanced(self._mean, time - self._chief_time)
+        inertial = osculating_state(state_from_elements(chief))
+        try:
+            given = [mean_relative_elements(inertial, state) for state in states]
+            moved = [drifted(chief, each, later) for later in ahead.tolist() for each in given]
+            chiefs = [advanced(chief, later) for later in ahead.tolist() for _ in given]
+            return _states_about(chiefs, moved).reshape(len(ahead), len(states), 6)
+        except OrbitError:
+            return super().coast(states, time, ahead)
+
+    def curvilinear(self, times: Vector) -> Matrix:
+        """As `states`, in curvilinear coordinates."""
+        return curvilinear_from_hill(self.states(times), self._chief, times - self._chief_time, MU)
+
+    def _transitions(self, time: float, ahead: Vector) -> Matrix:
+        return self.model.anchored(self._chief, self._chief_time).transitions(time, ahead)
+
+    def error(self) -> tuple[float, float]:
+        """No error worth a report, and the largest distance over the first revolution, m."""
+        path = self.states(np.linspace(0.0, math.tau / self._common.mean_motion, CHECKS + 1))
+        return 0.0, float(np.linalg.norm(path[:, :3], axis=1).max())
+
+
+def _states_about(chiefs: list[Elements], relative: list[Vector]) -> Matrix:
+    """(N, 6) relative states, Hill frame, of deputies with mean relative elements about chiefs with mean elements."""
+    orbits = [*chiefs, *map(deputy_elements, chiefs, relative)]
+    inertial = osculating_state(np.array([state_from_elements(each) for each in orbits]).reshape(-1, 6))
+    pairs = zip(inertial[: len(chiefs)], inertial[len(chiefs) :], strict=True)
+    return np.array([relative_from_inertial(chief, deputy) for chief, deputy in pairs]).reshape(-1, 6)
+
+
 def _path(model: type[LinearModel]) -> Callable[[Formation[Any], float, CommonParameters], TargetPath]:
-    return HillPath if model is HillModel else partial(ModelPath, model)
+    if model is HillModel:
+        return HillPath
+    return partial(ElementsPath if model is RelativeElementsModel else ModelPath, model)
 
 
 TARGET_MODELS = {

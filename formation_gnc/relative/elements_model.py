@@ -95,8 +95,7 @@ class RelativeElementsModel(LinearModel):
             return np.eye(6)
         start = self.chief_at(time)
         moved = hill_matrix(advanced(start, duration)) @ j2_transition(start, duration)
-        phi: Array = np.linalg.solve(hill_matrix(start).T, moved.T).T
-        return phi
+        return np.asarray(np.linalg.solve(hill_matrix(start).T, moved.T).T)
 
     def discretise(self, time: float, tick: float, state: Array = ON_THE_CHIEF) -> tuple[Array, Array]:
         """Phi (6, 6) in closed form, and Gamma (6, 3) by integration."""

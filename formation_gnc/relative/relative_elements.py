@@ -26,7 +26,7 @@ from formation_gnc.orbit.elements import (
     wrap,
 )
 from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
-from formation_gnc.orbit.mean import advanced, mean_state, osculating_state, secular_rates
+from formation_gnc.orbit.mean import advanced, mean_elements, osculating_state, secular_rates
 from formation_gnc.relative.element_differences import (
     check_node,
     secular_slopes,
@@ -99,8 +99,8 @@ def osculating_relative_elements(chief: Array, state: Array) -> Array:
 
 def mean_relative_elements(chief: Array, state: Array) -> Array:
     """As `osculating_relative_elements`, of the mean orbits of chief and deputy under J2."""
-    deputy = inertial_from_relative(chief, state)
-    return relative_elements(elements_from_state(mean_state(chief)), elements_from_state(mean_state(deputy)))
+    orbits = [mean_elements(elements_from_state(each)) for each in (chief, inertial_from_relative(chief, state))]
+    return relative_elements(*orbits)
 
 
 def state_from_osculating(chief: Array, relative: Array) -> Array:
@@ -110,7 +110,7 @@ def state_from_osculating(chief: Array, relative: Array) -> Array:
 
 def state_from_mean(chief: Array, relative: Array) -> Array:
     """(6,) relative state, Hill frame, m and m/s: the inverse of `mean_relative_elements`."""
-    deputy = deputy_elements(elements_from_state(mean_state(chief)), relative)
+    deputy = deputy_elements(mean_elements(elements_from_state(chief)), relative)
     return relative_from_inertial(chief, osculating_state(state_from_elements(deputy)))
 
 
