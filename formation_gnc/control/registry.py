@@ -9,6 +9,7 @@ from formation_gnc.control.controller import Controller
 from formation_gnc.control.finite_horizon import FiniteHorizonController
 from formation_gnc.control.gmpsp import GmpspController
 from formation_gnc.control.hinf import HInfinityController
+from formation_gnc.control.impulsive import Impulsive
 from formation_gnc.control.lqr import LinearQuadraticRegulator
 from formation_gnc.control.mpc import ModelPredictiveController
 from formation_gnc.control.mpsp import MpspController
@@ -26,6 +27,7 @@ ALGORITHMS: dict[str, type[Controller[Any]]] = {
     "sdre": Sdre,
     "sdre_finite": FiniteSdre,
     "asre": Asre,
+    "impulsive": Impulsive,
     "adaptive_lqr": AdaptiveLinearQuadraticRegulator,
 }
 ALGORITHMS.update(load_plugins("laws", Controller, ALGORITHMS))
