@@ -10,7 +10,11 @@ from types import MappingProxyType
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.plugins import load_plugins
+from formation_gnc.sensors.bearing import BEARING
 from formation_gnc.sensors.chief_range import CHIEF_RANGE
+from formation_gnc.sensors.chief_range_rate import CHIEF_RANGE_RATE
+from formation_gnc.sensors.gnss_position import GNSS_POSITION
+from formation_gnc.sensors.gnss_velocity import GNSS_VELOCITY
 from formation_gnc.sensors.latitude import LATITUDE
 from formation_gnc.sensors.radius import RADIUS
 from formation_gnc.sensors.range_rate import RANGE_RATE
@@ -23,6 +27,10 @@ _SENSORS: dict[str, Sensor] = {
     "latitude": LATITUDE,
     "right_ascension": RIGHT_ASCENSION,
     "chief_range": CHIEF_RANGE,
+    "chief_range_rate": CHIEF_RANGE_RATE,
+    "bearing": BEARING,
+    "gnss_position": GNSS_POSITION,
+    "gnss_velocity": GNSS_VELOCITY,
 }
 
 _in_use = False

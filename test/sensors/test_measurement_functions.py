@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from formation_gnc.orbit.constants import MU
 from formation_gnc.orbit.elements import Elements, state_from_elements
+from formation_gnc.orbit.frames import relative_from_inertial
 from formation_gnc.sensors.kernels import CODES, measure
 from formation_gnc.sensors.registry import sensors
 from formation_gnc.sensors.sensor import Sensor
@@ -74,7 +75,10 @@ def test_jacobians_are_the_slopes_of_the_readings(sensor: Sensor, chief: Vector,
     # A hundredth of the nearest place without a direction: order eight leaves (4 / 100)^8 of the derivative.
     axis = math.hypot(deputy[0], deputy[1])
     assume(axis > 1e4)
-    distance = min(axis, float(np.linalg.norm(separation[:3])))
+    normal = np.cross(chief[:3], chief[3:])
+    in_plane = float(np.linalg.norm(np.cross(separation[:3], normal / np.linalg.norm(normal))))
+    assume(in_plane > 0.05 * np.linalg.norm(separation[:3]))
+    distance = min(axis, in_plane)
     steps = np.repeat([distance, np.linalg.norm(deputy[3:])], 3) / 100.0
     # Readings are rounded to a few bits of themselves, and of what coordinates of 40000 km add to them.
     readings = np.abs(sensor.measure(deputy.tolist(), chief.tolist()))
@@ -154,12 +158,30 @@ def test_the_range_to_the_chief_is_the_same_from_either_end(one: Elements, other
     assert distance == pytest.approx(float(np.linalg.norm(deputy[:3] - chief[:3])), rel=1e-14)
 
 
+@given(chief=orbits.map(state_from_elements), separation=separations)
+def test_relative_sensors_read_the_relative_state(chief: Vector, separation: Vector) -> None:
+    deputy = chief + separation
+    relative = relative_from_inertial(chief, deputy)
+    azimuth, elevation = sensors()["bearing"].measure(deputy.tolist(), chief.tolist())
+    distance = value("chief_range", deputy, chief)
+    direction = [math.cos(elevation) * math.sin(azimuth), math.cos(elevation) * math.cos(azimuth), math.sin(elevation)]
+    # Coordinates of 4e7 m are rounded to 7e-9 m, over distances of 100 m.
+    np.testing.assert_allclose(distance * np.array(direction), relative[:3], rtol=1e-13, atol=1e-7)
+    names = ("gnss_position", "gnss_velocity")
+    position, velocity = (np.array(sensors()[name].measure(deputy.tolist(), chief.tolist())) for name in names)
+    np.testing.assert_allclose(np.concatenate([position, velocity]), deputy - chief, rtol=0.0, atol=0.0)
+    later = float(np.linalg.norm(position + 1e-3 * velocity)) - float(np.linalg.norm(position - 1e-3 * velocity))
+    assert value("chief_range_rate", deputy, chief) == pytest.approx(later / 2e-3, abs=1e-5)
+
+
 @pytest.mark.parametrize(
     ("name", "deputy"),
     [
         ("latitude", [0.0, 0.0, 7e6, 7e3, 0.0, 0.0]),
         ("right_ascension", [0.0, 0.0, -7e6, 7e3, 0.0, 0.0]),
         ("chief_range", CHIEF.tolist()),
+        ("chief_range_rate", CHIEF.tolist()),
+        ("bearing", CHIEF.tolist()),
     ],
 )
 def test_derivatives_without_a_direction_are_not_finite(name: str, deputy: list[float]) -> None:
