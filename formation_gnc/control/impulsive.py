@@ -14,13 +14,11 @@ from formation_gnc.control.impulse_plan import (
     least_across,
     least_in_plane,
 )
+from formation_gnc.control.models import near_circular_rates
 from formation_gnc.control.plan import held_over_tick
 from formation_gnc.control.target_prediction import has_jumped
-from formation_gnc.errors import DesignError
 from formation_gnc.parameters import parameter
 from formation_gnc.records import NavigationState, Target
-from formation_gnc.relative.chief import DISTINCT_PERIGEE
-from formation_gnc.relative.j2_mean_motion import J2MeanMotionModel
 from formation_gnc.relative.relative_elements import near_circular_elements
 from formation_gnc.types import NANOSECONDS, Matrix, Vector
 
@@ -84,17 +82,7 @@ class Impulsive(Controller[ImpulsiveParameters]):
             DesignError: an eccentric chief, or no thrust along the track.
         """
         self._parameters, self._tick, self._limit = parameters, common.tick, vehicle.thrust_limit
-        if common.chief.eccentricity >= DISTINCT_PERIGEE:
-            raise DesignError(
-                f"impulsive: chief.eccentricity is {common.chief.eccentricity:g}; it must be below "
-                f"{DISTINCT_PERIGEE:g} for burns in closed form"
-            )
-        if not self._limit[1] > 0.0:
-            raise DesignError(
-                f"impulsive: thrust_limit along the track is {self._limit[1]:g} N; it must be above 0 for control in "
-                "the orbit plane"
-            )
-        self._rate, *self._phase_rates = J2MeanMotionModel.about(common.chief_elements).frequencies
+        self._rate, *self._phase_rates = near_circular_rates("impulsive", common, vehicle.thrust_limit)
         self._burns: dict[int, _Burn] = {}
         """Under way, by axis."""
         self._target: Target | None = None

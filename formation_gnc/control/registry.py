@@ -13,6 +13,7 @@ from formation_gnc.control.impulsive import Impulsive
 from formation_gnc.control.lqr import LinearQuadraticRegulator
 from formation_gnc.control.mpc import ModelPredictiveController
 from formation_gnc.control.mpsp import MpspController
+from formation_gnc.control.roe_lyapunov import RoeLyapunov
 from formation_gnc.control.sdre import Sdre
 from formation_gnc.control.sdre_finite import FiniteSdre
 from formation_gnc.plugins import load_plugins
@@ -28,6 +29,7 @@ ALGORITHMS: dict[str, type[Controller[Any]]] = {
     "sdre_finite": FiniteSdre,
     "asre": Asre,
     "impulsive": Impulsive,
+    "roe_lyapunov": RoeLyapunov,
     "adaptive_lqr": AdaptiveLinearQuadraticRegulator,
 }
 ALGORITHMS.update(load_plugins("laws", Controller, ALGORITHMS))
