@@ -1,71 +1,120 @@
 """Several publishers of one topic: whose messages count, and who is named."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from enum import Enum
 
 UNKNOWN = "_NODE_NAME_UNKNOWN_"
 """In the place of a publisher's name, as ROS has it, until the middleware knows it."""
 
+SUCCESSION = 0.5
+"""Wall time (s) of silence after which a node's publisher is taken for dead, if the node has a new one."""
 
-@dataclass
-class _Stream:
-    """Messages of one publisher: the last stamp (ns) and number received from it."""
+LOOK = 0.1
+"""Wall time (s) for which the list of a topic's publishers is not asked for again, whatever is received."""
 
-    stamp: int
-    number: int | None
 
-    def leads_to(self, stamp: int, number: int | None) -> bool:
-        """Whether a message is the next one."""
-        return stamp > self.stamp and (number is None or self.number is None or number == self.number + 1)
+class Verdict(Enum):
+    """What is to be done with a message."""
+
+    COUNTS = "counts"
+    HELD = "held"
+    """It counts once its publisher has succeeded the one before."""
+    REFUSED = "refused"
 
 
 class SourceLock:
-    """Keeps a reader to one publisher where others publish the topic too.
+    """Keeps a reader to one publisher of a topic, by its identity.
 
-    A message does not carry its publisher, but each publisher numbers its own. While a topic has one publisher, every
-    message counts, as those of a new run do; while it has several, only what leads on from the last that counted,
-    and not from what others have published. The name of a publisher may be known later than its first messages:
-    they count, as those of a node that was started again, until the publisher before goes on.
+    The first one whose message counted stays the one until it has left the graph. A process that was killed stays
+    listed for a while: a new publisher of a node of the same name succeeds it when it has been silent for SUCCESSION
+    since the new one's first message. If it was only slow, and goes on after all, it counts again, the other does not.
+    Times `now` are seconds of a monotonic wall clock.
     """
 
-    def __init__(self) -> None:
-        """No message has come."""
-        self.ignored = 0
-        """Messages that did not count."""
-        self._heard: _Stream | None = None
-        self._before: _Stream | None = None
-        """The one before, which has ended if the one that counts is the same node started again."""
-        self._others: list[_Stream] = []
+    def __init__(self, publishers: Callable[[], Mapping[bytes, str]]) -> None:
+        """No message has come.
 
-    def accepts(self, stamp: int, number: int | None, is_shared: Callable[[], bool]) -> bool:
-        """Whether a message counts.
-
-        Args:
-            stamp: ns.
-            number: its publisher's sequence number; None where the middleware has none.
-            is_shared: whether the topic has several publishers; asked only where the numbers do not decide.
+        publishers: full names of the nodes that publish the topic just now, by identity of their publishers.
         """
-        heard = self._heard
-        follows = heard is None or heard.leads_to(stamp, number)
-        others = [each for each in self._others if number is not None and each.leads_to(stamp, number)]
-        if not follows and heard and self._before and number is not None and self._before.leads_to(stamp, number):
-            self._others.append(heard)  # a stranger, whose name was not known yet
-            self._heard, self._before = _Stream(stamp, number), None
-            return True
-        if others and (not follows or is_shared()):
-            others[0].stamp, others[0].number = stamp, number
-            self.ignored += 1
+        self.chosen: bytes | None = None
+        """Identity of the one that counts."""
+        self.refused: Counter[str] = Counter()
+        """Messages that did not count, by the name of the node."""
+        self.candidate: bytes | None = None
+        """Identity of the one that may succeed."""
+        self._publishers, self._listed, self._looked = publishers, dict[bytes, str](), -LOOK
+        self._names: dict[bytes, str] = {}
+        self._since = 0.0
+        self._before: bytes | None = None
+        self._twins: set[bytes] = set()
+
+    @property
+    def ignored(self) -> int:
+        """Messages that did not count."""
+        return self.refused.total()
+
+    def judge(self, publisher: bytes, now: float) -> Verdict:
+        """Whether a message of a publisher counts."""
+        if self.chosen in (None, publisher):
+            self._drop_candidate()
+            return Verdict.COUNTS
+        if publisher == self._before and self.chosen is not None:
+            self._twins.add(self.chosen)
+            self.choose(publisher)
+            return Verdict.COUNTS
+        self._look(now)
+        if self.chosen not in self._listed:
+            self._succeed(publisher)
+            return Verdict.COUNTS
+        if publisher not in self._twins and self._may_be_the_same_node(publisher):
+            if self.candidate != publisher:
+                self.candidate, self._since = publisher, now
+            return Verdict.HELD
+        self.refused[self.name_of(publisher, now)] += 1
+        return Verdict.REFUSED
+
+    def choose(self, publisher: bytes) -> None:
+        """Keep to a publisher, whose message counted."""
+        self.chosen, self._before, self.candidate = publisher, None, None
+
+    def succeeds(self, now: float) -> bool:
+        """Whether the candidate, if there is one, now counts in place of the one before."""
+        if self.candidate is None or now - self._since < SUCCESSION:
             return False
-        if not follows and is_shared():
-            self._others.append(_Stream(stamp, number))
-            self.ignored += 1
+        self._look(now)
+        publisher, before = self.candidate, self.chosen
+        if before in self._listed and self._listed.get(publisher) != self._listed[before]:
             return False
-        if not follows:
-            self._others.clear()
-            self._before = heard
-        self._heard = _Stream(stamp, number)
+        self._succeed(publisher)
+        self._before = before
         return True
+
+    def name_of(self, publisher: bytes, now: float) -> str:
+        """Full name of a publisher's node, if it is known or was."""
+        if publisher not in self._names:
+            self._look(now)
+        return self._names.get(publisher, "an unknown node")
+
+    def _succeed(self, publisher: bytes) -> None:
+        self.choose(publisher)
+        self._twins.clear()
+
+    def _drop_candidate(self) -> None:
+        """The one that counts goes on: who would have succeeded it is another."""
+        if self.candidate is not None:
+            self._twins.add(self.candidate)
+            self.candidate = None
+
+    def _may_be_the_same_node(self, publisher: bytes) -> bool:
+        """Whether the names of its node and of the chosen one's are the same, or not known yet."""
+        name, other = self._listed.get(publisher, UNKNOWN), self._listed.get(self.chosen or b"", UNKNOWN)
+        return name == other or UNKNOWN in name or UNKNOWN in other
+
+    def _look(self, now: float) -> None:
+        if now - self._looked >= LOOK:
+            self._looked, self._listed = now, dict(self._publishers())
+            self._names |= {each: name for each, name in self._listed.items() if UNKNOWN not in name}
 
 
 def names_of(publishers: Sequence[str]) -> str:

@@ -9,15 +9,14 @@ from rclpy._rclpy_pybind11 import NodeNameNonExistentError
 
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import COMMAND, every_tick
+from formation_gnc.flight.reception import Information
 from formation_gnc.plant.parameters import PlantParameters
-from formation_gnc.records import Clock, Event, Measurement, Thrust, Truth
+from formation_gnc.records import Clock, Measurement, Thrust, Truth
 from formation_gnc.sil.plant_executive import PlantExecutive
 from formation_gnc.sil.report import Report
-from formation_gnc.transport.conversion import from_cdr
 from formation_gnc.transport.diagnostics import RUN, DiagnosticsPublisher
 from formation_gnc.transport.node import ConfiguredNode
 from formation_gnc.transport.process import run, stop_requested
-from formation_gnc.transport.subscriptions import Information
 
 
 class PlantNode(ConfiguredNode):
@@ -27,21 +26,22 @@ class PlantNode(ConfiguredNode):
         """Build the plant from the node's parameters."""
         super().__init__("plant", PlantParameters)
         deputies = self.values.deputies
-        records = {topics.TRUTH.name: Truth, topics.EVENTS.name: Event, topics.CLOCK.name: Clock}
+        records = {topics.TRUTH.name: Truth, topics.CLOCK.name: Clock}
         records |= {topics.MEASUREMENT.of(name): Measurement for name in deputies}
         self._publish = {topic: self.publisher_of(record, topic) for topic, record in records.items()}
+        self._publish[topics.EVENTS.name] = self.publish_event
         self._diagnostics = DiagnosticsPublisher(self, self.full_name("") or "/", RUN)
-        recorded = {*records, *(topic for name in deputies for topic in every_tick(name))}
+        recorded = {*self._publish, *(topic for name in deputies for topic in every_tick(name))}
         self._recorded_topics = set(map(self.full_name, recorded))
         self.executive = PlantExecutive(self.values, self)
         for name in deputies:
-            self.subscribe_to_source(Thrust, COMMAND.of(name), partial(self._on_thrust, name))
-        self.subscribe_decoded(Clock, topics.PROGRESS.name, self._on_progress)
+            self.subscribe(Thrust, COMMAND.of(name), partial(self._on_thrust, name))
+        self.subscribe(Clock, topics.PROGRESS.name, self._on_progress)
 
-    def _on_thrust(self, deputy: str, data: bytes, _: Information) -> None:
-        self.executive.answer(deputy, from_cdr(Thrust, data), monotonic())
+    def _on_thrust(self, deputy: str, thrust: Thrust, _: Information) -> bool:
+        return self.executive.answer(deputy, thrust, monotonic())
 
-    def _on_progress(self, progress: Clock) -> None:
+    def _on_progress(self, progress: Clock, _: Information) -> None:
         self.executive.recorded(progress.time, monotonic())
 
     def stage_parameters(self, changes: Mapping[str, Any]) -> tuple[Any, Callable[[], None]]:
@@ -53,8 +53,10 @@ class PlantNode(ConfiguredNode):
     def publish(self, topic: str, record: Any) -> None:
         """Publish a record; events are logged too."""
         self._publish[topic](record)
-        if topic == topics.EVENTS.name:
-            self.log_event(record)
+
+    def simulated_time(self) -> int:
+        """Stamp (ns) of the tick in flight."""
+        return self.executive.simulation.plant.time
 
     def has_recorder(self) -> bool:
         """Whether a recorder reports progress."""

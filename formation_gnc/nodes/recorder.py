@@ -63,7 +63,7 @@ class RecorderNode(ConfiguredNode):
         self.create_wall_timer(FLUSH_INTERVAL, self.session.while_disk_lasts(self.session.bag.flush))
 
     def _open(self, topic: str, type_name: str, latched: bool) -> Callback:
-        return self.session.open_topic(topic, type_name, partial(self.publishers_of, topic), latched)
+        return self.session.open_topic(topic, type_name, partial(self.identities_on, topic), latched)
 
     def _look(self) -> None:
         session, now = self.session, monotonic()
@@ -78,8 +78,14 @@ class RecorderNode(ConfiguredNode):
                 session.parameters.asked(node, now)
         if session.parameters.is_complete(now):
             session.report_progress()
+        for topic, text in session.look():
+            self.warn(topic, text)
         for text in session.new_troubles():
             self.get_logger().warning(text)
+
+    def simulated_time(self) -> int:
+        """Stamp (ns) up to which everything is recorded."""
+        return max(0, self.session.progress.stamp)
 
     def _diagnose(self) -> None:
         failure, lost, stamp = self.session.failure, self.session.lost, self.session.progress.stamp

@@ -9,6 +9,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
+from formation_gnc.flight.reception import Information
 from formation_gnc.recording.player import PlayedTick, ReplayParameters, TickPlayer
 from formation_gnc.records import Clock, Thrust
 from formation_gnc.transport.conversion import message_class
@@ -16,7 +17,7 @@ from formation_gnc.transport.diagnostics import PERIOD, DiagnosticsPublisher
 from formation_gnc.transport.node import ConfiguredNode
 from formation_gnc.transport.process import run, stop_requested
 from formation_gnc.transport.qos import quality
-from formation_gnc.transport.subscriptions import Information, first_stamp
+from formation_gnc.transport.subscriptions import first_stamp
 from formation_gnc.types import NANOSECONDS
 
 BURST = 50
@@ -36,7 +37,7 @@ class ReplayNode(ConfiguredNode):
         self._played = {name: self._publisher(name) for name in self.player.topics}
         self._publish_clock = self.publisher_of(Clock, topics.CLOCK.name)
         for name in sorted(self.player.answers):
-            self.subscribe(Thrust, name, partial(self._on_answer, name))
+            self.subscribe(Thrust, name, partial(self._on_answer, name), decode=first_stamp)
         self._diagnostics = DiagnosticsPublisher(self, self.full_name("") or "/")
         self.create_wall_timer(PERIOD, self._diagnose)
         self.create_service(SetBool, "~/pause", self._on_pause)
@@ -77,8 +78,8 @@ class ReplayNode(ConfiguredNode):
         values = {"bag": player.bag.path, "played_to": stamp / NANOSECONDS}
         self._diagnostics.publish(DiagnosticStatus.OK, message, values, stamp)
 
-    def _on_answer(self, topic: str, data: bytes, _: Information) -> None:
-        self.player.answer(topic, first_stamp(data))
+    def _on_answer(self, topic: str, stamp: int, _: Information) -> None:
+        self.player.answer(topic, stamp)
         self.check()
 
     def _on_pause(self, request: Any, response: Any) -> Any:

@@ -1,11 +1,13 @@
 """Recording of a run: messages, losses, progress and parameters."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from typing import Any
 
+from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import MODULES
-from formation_gnc.flight.sources import SourceLock, is_shared
+from formation_gnc.flight.reception import Information, Reception
 from formation_gnc.parameters import to_json
 from formation_gnc.recording.layout import LAYOUT, foxglove_layout
 from formation_gnc.recording.loss import LossCounter
@@ -52,40 +54,36 @@ class RecordingSession:
         self._snapshot = Snapshot(bag, snapshot) if snapshot else None
         self._write = self._snapshot.write if self._snapshot else bag.write
         self._losses: dict[str, LossCounter] = {}
-        self._locks: dict[str, SourceLock] = {}
+        self._receptions: dict[str, Reception[bytes]] = {}
         self._said = [0, 0]
         self._received = True
 
     def open_topic(
-        self, topic: str, type_name: str, publishers: Callable[[], Sequence[str]], latched: bool
-    ) -> Callable[[bytes, int, int | None], None]:
+        self, topic: str, type_name: str, publishers: Callable[[], Mapping[bytes, str]], latched: bool
+    ) -> Callable[[bytes, Information], None]:
         """Add a topic to the bag.
 
         Args:
             topic: full name.
             type_name: of its messages.
-            publishers: full names of the nodes that publish it just now, once for each publisher.
+            publishers: full names of the nodes that publish it just now, by the identities of their publishers.
             latched: whether late subscribers get what was published before.
 
         Returns:
-            What takes its messages: CDR bytes, stamp in ns, and the publisher's sequence number if there is one.
-            Of a topic with a message at every tick, those of other publishers are left out (:class:`SourceLock`).
+            What takes its messages: CDR bytes and what is known of them, their `stamp` in ns included. Of a topic with
+            a message at every tick, those of a second publisher are left out (:class:`Reception`).
         """
         self.bag.add_topic(topic, type_name, topics.QUEUE_DEPTH)
-        loss = self._losses[topic] = LossCounter(lambda: len(publishers()), latched)
-        lock, node = SourceLock(), _answering(topic)
+        loss, node = LossCounter(lambda: len(publishers()), latched), _answering(topic)
+        self._losses[topic] = loss
         is_ours = type_name in topics.types_of(topic)
         is_clock, is_events = is_ours and topic == topics.CLOCK.name, is_ours and topic == topics.EVENTS.name
         concerns_progress = is_ours and self.progress.concerns(topic)
-        if is_ours and topic in topics.of_one_publisher(topics.deputy_of(topic)):
-            self._locks[topic] = lock
         count = 0
 
-        def take(data: bytes, stamp: int, number: int | None) -> None:
+        def take(data: bytes, about: Information) -> None:
             nonlocal count
-            self._received = True
-            if topic in self._locks and not lock.accepts(stamp, number, lambda: is_shared(publishers())):
-                return
+            stamp, number = about["stamp"], about["publication_sequence_number"]
             count += 1
             if number is not None:
                 loss.take(number)
@@ -95,11 +93,30 @@ class RecordingSession:
             if concerns_progress:
                 self.progress.take(topic, stamp, lambda: len(publishers()))
             elif is_events:
-                self.progress.take_event(self._decode_event(data))
+                with suppress(ConfigurationError):  # recorded as it is
+                    self.progress.take_event(self._decode_event(data))
             if is_clock and count % REPORT_TICKS == 0:
                 self.report_progress()
 
-        return self.while_disk_lasts(take)
+        if is_ours and topic in topics.of_one_publisher(topics.deputy_of(topic)):
+            reception = self._receptions[topic] = Reception(topic, lambda data: data, take, publishers)
+            return self.while_disk_lasts(self._noting(reception.receive))
+        return self.while_disk_lasts(self._noting(take))
+
+    def _noting(self, take: Callable[[bytes, Information], None]) -> Callable[[bytes, Information], None]:
+        """Wrap what takes messages to note that there are any."""
+
+        def noting(data: bytes, about: Information) -> None:
+            self._received = True
+            take(data, about)
+
+        return noting
+
+    def look(self) -> Iterator[tuple[str, str]]:
+        """Let publishers succeed those before them; yields topics and what is new to say of each, in words."""
+        for topic, reception in self._receptions.items():
+            for text in reception.look():
+                yield topic, text
 
     def report_progress(self) -> None:
         """Report the progress, if it has changed."""
@@ -144,7 +161,7 @@ class RecordingSession:
     @property
     def ignored(self) -> dict[str, int]:
         """Messages of other publishers left out so far by topic, where there are any."""
-        return {topic: each.ignored for topic, each in self._locks.items() if each.ignored}
+        return {topic: each.lock.ignored for topic, each in self._receptions.items() if each.lock.ignored}
 
     @property
     def lost(self) -> int:

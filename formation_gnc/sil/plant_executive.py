@@ -93,10 +93,12 @@ class PlantExecutive:
                 self._report("flying", now)
         return self.finished
 
-    def answer(self, deputy: str, thrust: Thrust, now: float) -> None:
-        """Take a thrust command."""
-        if self.simulation.answer(deputy, thrust):
+    def answer(self, deputy: str, thrust: Thrust, now: float) -> bool:
+        """Take a thrust command; returns whether it counts."""
+        counts = self.simulation.answer(deputy, thrust)
+        if counts:
             self.advance_if_ready(now)
+        return counts
 
     def recorded(self, stamp: int, now: float) -> None:
         """Take the recorder's word that it has everything up to a stamp (ns)."""

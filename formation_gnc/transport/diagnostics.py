@@ -1,6 +1,7 @@
 """The state of a run and of its nodes on `/diagnostics`."""
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -51,7 +52,8 @@ def subscribe_to_reports(node: Node, callback: Callable[[Report], None]) -> None
         for status in array.status:
             if status.name == RUN:
                 message, *troubles = status.message.split("; ")
-                figures = {each.key: float(each.value) for each in status.values}
-                callback(Report(message, figures, tuple(troubles)))
+                with suppress(ValueError):  # another's, in our name
+                    figures = {each.key: float(each.value) for each in status.values}
+                    callback(Report(message, figures, tuple(troubles)))
 
     node.create_subscription(DiagnosticArray, topics.DIAGNOSTICS.name, receive, quality())

@@ -11,15 +11,12 @@ from rclpy.service import Service
 
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import ModuleInstance, Row
-from formation_gnc.flight.sources import SourceLock
-from formation_gnc.flight.synchronizer import HISTORY
+from formation_gnc.flight.reception import Information, figures
 from formation_gnc.parameters import dump
-from formation_gnc.records import WARNINGS, Event, EventKind, Timing
+from formation_gnc.records import WARNINGS, EventKind, Timing
 from formation_gnc.transport.bus import IntraProcessBus
-from formation_gnc.transport.conversion import codec
 from formation_gnc.transport.diagnostics import PERIOD, DiagnosticsPublisher
 from formation_gnc.transport.node import ConfiguredNode
-from formation_gnc.transport.subscriptions import Information
 from formation_gnc.types import NANOSECONDS
 
 SETTLING = 0.1
@@ -30,9 +27,6 @@ SOON = 1_000_000
 
 LATE = 50_000_000
 """Wall time (ns) after which a message that is received counts as one of several that wait."""
-
-INPUT_DEPTH = HISTORY
-"""Messages of an input that may wait: those that come at once to a node which is still starting, or is busy."""
 
 
 class ModuleNode(ConfiguredNode):
@@ -59,14 +53,11 @@ class ModuleNode(ConfiguredNode):
         self._publish = {
             topic.of(self._instance.deputy): self._published(topic) for topic in self._instance.published()
         }
-        self._publish_event = self.publisher_of(Event, topics.EVENTS.name)
         self._publish_timing = self.publisher_of(Timing, topics.TIMING.of(self._instance.deputy))
         self._started = time_ns()
-        self._waiting: dict[str, list[tuple[int, bytes]]] = {}
+        self._waiting: dict[str, list[tuple[int, Any]]] = {}
         self._catch_up_soon = self.create_wall_timer(SETTLING, self._catch_up)
         self._catch_up_soon.cancel()
-        self._decoders: dict[str, Callable[[bytes], Any]] = {}
-        self._locks: dict[str, SourceLock] = {}
         for topic, record in {**self._instance.inputs, **self._instance.inputs_of_others}.items():
             self._subscribe_input(topic, record)
         self._answered, self._warning = 0, ""
@@ -92,27 +83,22 @@ class ModuleNode(ConfiguredNode):
         if topic in self._bus:
             self._bus.subscribe(topic, partial(self._take, topic))
         else:
-            self._decoders[topic] = codec(record).decode
-            self._locks[topic] = self.subscribe_to_source(record, topic, partial(self._receive, topic), INPUT_DEPTH)
+            self.subscribe(record, topic, partial(self._receive, topic))
 
-    def _receive(self, topic: str, data: bytes, about: Information) -> None:
+    def _receive(self, topic: str, record: Any, about: Information) -> None:
         published = about["source_timestamp"]
         if not self._waiting and time_ns() - published < LATE:
-            self._take(topic, self._decoders[topic](data))
+            self._take(topic, record)
             return
         if not self._waiting:
             self._catch_up_soon.reset()
-        self._waiting.setdefault(topic, []).append((published, data))
+        self._waiting.setdefault(topic, []).append((published, record))
 
     def _catch_up(self) -> None:
         """Go on with the last tick of those that wait, or with what the module cannot do without."""
         self._catch_up_soon.cancel()
         self._catch_up_soon.timer_period_ns = SOON
-        waiting, self._waiting = self._waiting, {}
-        records = {
-            topic: [(published, self._decoders[topic](data)) for published, data in messages]
-            for topic, messages in waiting.items()
-        }
+        records, self._waiting = self._waiting, {}
         pacing = records.get(next(iter(self._instance.inputs)), [])
         addressed = [record for published, record in pacing[:-1] if published >= self._started]
         addressed += [record for _, record in pacing[-1:]]
@@ -138,8 +124,7 @@ class ModuleNode(ConfiguredNode):
 
     def _publish_events(self) -> None:
         for event in self._instance.take_events():
-            self.log_event(event)
-            self._publish_event(event)
+            self.publish_event(event)
             if event.kind in WARNINGS:
                 self._warning = str(event)
             if event.kind in (EventKind.PARAMETERS, EventKind.REJECTED):
@@ -148,7 +133,7 @@ class ModuleNode(ConfiguredNode):
     def _diagnose(self) -> None:
         """Publish whether the module answers, and its events since the last diagnostics."""
         level, message = DiagnosticStatus.OK, "answering"
-        ignored = [topic for topic, lock in self._locks.items() if lock.ignored]
+        ignored = [each.topic for each in self.receptions if each.lock.ignored or each.misfits]
         if not self._answered:
             level, message = DiagnosticStatus.WARN, f"waiting for {' and '.join(self._instance.inputs)}"
         elif self._module.waiting_for:
@@ -156,11 +141,20 @@ class ModuleNode(ConfiguredNode):
         elif self._warning:
             level, message = DiagnosticStatus.WARN, self._warning
         elif ignored:
-            level, message = DiagnosticStatus.WARN, f"ignored those of other nodes on {' and '.join(ignored)}"
+            level, message = DiagnosticStatus.WARN, f"messages left out on {' and '.join(ignored)}"
         self._warning = ""
         values = {"tick": self._module.time // self._module.parameters.tick_ns, "answered": self._answered}
-        values["ignored"] = sum(lock.ignored for lock in self._locks.values())
+        values |= figures(self.receptions)
         self._diagnostics.publish(level, message, values, self._module.time)
+
+    def simulated_time(self) -> int:
+        """Stamp (ns) of the module's latest tick."""
+        return self._module.time
+
+    def warn(self, subject: str, detail: str) -> None:
+        """Publish an event of this node that somebody should look at, and give it in the diagnostics."""
+        super().warn(subject, detail)
+        self._warning = f"{subject}: {detail}"
 
     def stage_parameters(self, changes: Mapping[str, Any]) -> tuple[Any, Callable[[], None]]:
         """Design for a change; it takes effect at the next tick."""

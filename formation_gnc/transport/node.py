@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable, Mapping
+from functools import cached_property, partial
 from time import monotonic
 from typing import Any
 
@@ -22,17 +23,20 @@ except ImportError:  # missing in other builds of Jazzy; slower, same behaviour
     EventsExecutor = SingleThreadedExecutor
 
 from formation_gnc.errors import ConfigurationError
+from formation_gnc.flight import topics
 from formation_gnc.flight.graph import PLANT
-from formation_gnc.flight.sources import SourceLock, is_shared
+from formation_gnc.flight.reception import Information, Reception
 from formation_gnc.flight.topics import QUEUE_DEPTH
 from formation_gnc.parameters import OWN_OF_ROS, Leaf, change, dump, leaves, load, read_yaml
 from formation_gnc.records import WARNINGS, Event, EventKind
 from formation_gnc.sil.following import departures, values_of_plant, with_followed
 from formation_gnc.transport.conversion import codec, message_type
+from formation_gnc.transport.identified import identities, unsubscribe
 from formation_gnc.transport.parameter_arguments import given_parameters, without_parameters
 from formation_gnc.transport.process import stop_requested
-from formation_gnc.transport.qos import LATEST, quality
-from formation_gnc.transport.subscriptions import Information, first_stamp, names, subscribe_to_all
+from formation_gnc.transport.qos import quality
+from formation_gnc.transport.subscriptions import subscribe_to_all
+from formation_gnc.types import NANOSECONDS
 
 Executor: Any = EventsExecutor
 
@@ -60,6 +64,7 @@ class ConfiguredNode(Node):  # type: ignore[misc]
         namespace: of the node within its formation, unless it is remapped; empty or one token.
         """
         self._served_by: Any = None
+        self.receptions: list[Reception[Any]] = []
         super().__init__(name, namespace=namespace, cli_args=without_parameters(sys.argv), use_global_arguments=False)
         full_name, depth = self.get_fully_qualified_name(), 2 if namespace else 1
         self._formation = full_name.rsplit("/", depth)[0]
@@ -76,6 +81,7 @@ class ConfiguredNode(Node):  # type: ignore[misc]
         self._leaves = {leaf.name: leaf for leaf in leaves(schema, settled)}
         for leaf in self._leaves.values():
             self._declare(leaf, settled[leaf.name])
+        self.create_wall_timer(CHECK_PERIOD, self._look_at_receptions)
         for service in self.services:
             if service.srv_name.endswith(("/set_parameters", "/set_parameters_atomically")):
                 service.callback = _rejecting_malformed(service.callback)
@@ -160,39 +166,56 @@ class ConfiguredNode(Node):  # type: ignore[misc]
         return lambda each: publisher.publish(encode(each))
 
     def subscribe(
-        self, record: type, topic: str, callback: Callable[[bytes, Information], object], depth: int = LATEST
-    ) -> None:
-        """Call back with a topic's messages of a record, as CDR bytes and what is known of each.
+        self,
+        record: type,
+        topic: str,
+        take: Callable[[Any, Information], object],
+        depth: int = QUEUE_DEPTH,
+        decode: Callable[[bytes], Any] | None = None,
+    ) -> Reception[Any]:
+        """Call `take` with a topic's records that count, and with what is known of each (:class:`Reception`).
 
-        depth: messages kept between two callbacks, the latest.
+        depth: messages kept between two callbacks, of all publishers: a burst of a stranger's must not push out the one
+        that is awaited. decode: what to make of a message; its record by default.
         """
-        subscribe_to_all(self, message_type(record), self.full_name(topic), callback, depth)
+        reception = Reception(topic, decode or codec(record).decode, take, partial(self.identities_on, topic))
+        self.receptions.append(reception)
+        subscribe_to_all(self, message_type(record), self.full_name(topic), reception.receive, depth)
+        return reception
 
-    def subscribe_to_source(
-        self, record: type, topic: str, callback: Callable[[bytes, Information], object], depth: int = QUEUE_DEPTH
-    ) -> SourceLock:
-        """As `subscribe`; where several nodes publish the topic, to the first one only (:class:`SourceLock`).
-
-        depth: all share it, so that a burst of other nodes' messages must not push out the one that is awaited.
-        """
-        lock = SourceLock()
-
-        def receive(data: bytes, about: Information) -> None:
-            number = about["publication_sequence_number"]
-            if lock.accepts(first_stamp(data), number, lambda: is_shared(self.publishers_of(topic))):
-                callback(data, about)
-
-        self.subscribe(record, topic, receive, depth)
-        return lock
+    def identities_on(self, topic: str) -> dict[bytes, str]:
+        """Full names of the nodes that publish a topic, by the identities of their publishers."""
+        return identities(self, self.full_name(topic))
 
     def publishers_of(self, topic: str) -> list[str]:
         """Full names of the nodes that publish a topic, once for each publisher."""
-        return names(self.get_publishers_info_by_topic(self.full_name(topic)))
+        return list(self.identities_on(topic).values())
 
-    def subscribe_decoded(self, record: type, topic: str, callback: Callable[[Any], object]) -> None:
-        """As `subscribe`, with the record of the latest message."""
-        decode: Callable[[bytes], Any] = codec(record).decode
-        self.subscribe(record, topic, lambda data, _: callback(decode(data)))
+    def simulated_time(self) -> int:
+        """Stamp (ns) at which this node is."""
+        return 0
+
+    @cached_property
+    def publish_event(self) -> Callable[[Event], None]:
+        """Publishes and logs an event."""
+        publish = self.publisher_of(Event, topics.EVENTS.name)
+
+        def publish_and_log(event: Event) -> None:
+            publish(event)
+            self.log_event(event)
+
+        return publish_and_log
+
+    def warn(self, subject: str, detail: str) -> None:
+        """Publish an event of this node that somebody should look at; `subject` is a topic's name."""
+        time, node = self.simulated_time(), self.get_fully_qualified_name().removeprefix(self._formation)
+        tick = time // round(self.values.tick * NANOSECONDS)
+        self.publish_event(Event(time, tick, node, EventKind.WARNING, subject, [], detail))
+
+    def _look_at_receptions(self) -> None:
+        for reception in self.receptions:
+            for text in reception.look():
+                self.warn(reception.topic, text)
 
     def log_event(self, event: Event) -> None:
         """Log an event at the level of its kind; rclpy allows one level per line of code."""
@@ -225,6 +248,7 @@ class ConfiguredNode(Node):  # type: ignore[misc]
             self._served_by.remove_node(self)
             if not self._served_by.get_nodes():
                 self._served_by.shutdown()
+        unsubscribe(self)
         super().destroy_node()
 
 

@@ -1,7 +1,9 @@
 """Every topic of a graph as it comes: bytes, stamped with simulated time, numbered by its publishers."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
+from time import monotonic
 from typing import Any
 
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -10,13 +12,15 @@ from rclpy.qos import QoSDurabilityPolicy, QoSProfile, QoSReliabilityPolicy
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
-from formation_gnc.flight.sources import SourceLock, is_shared
+from formation_gnc.flight.reception import Information
+from formation_gnc.flight.sources import SourceLock, Verdict
 from formation_gnc.transport.conversion import message_class
+from formation_gnc.transport.identified import IdentifiedSubscription, identities
 from formation_gnc.transport.qos import quality
-from formation_gnc.transport.subscriptions import first_stamp, names, with_information
+from formation_gnc.transport.subscriptions import first_stamp
 
-Callback = Callable[[bytes, int, int | None], None]
-"""Takes a message's CDR bytes, stamp in ns and its publisher's sequence number, if the middleware has one."""
+Callback = Callable[[bytes, Information], None]
+"""Takes a message's CDR bytes and what is known of it, with its `stamp` in ns."""
 
 
 class RawTopics:
@@ -43,11 +47,14 @@ class RawTopics:
         self._known: set[str] = set()
         self._unheard: set[str] = set()
         self._receivers: dict[str, tuple[Any, Callable[..., None]]] = {}
-        self._subscriptions: dict[str, Any] = {}
+        self._subscriptions: dict[str, IdentifiedSubscription] = {}
+        self._clocks: list[SourceLock] = []
         self._time = 0
 
     def look(self) -> None:
         """Subscribe to the topics that have appeared since, and again where a writer is not matched."""
+        for lock in self._clocks:
+            lock.succeeds(monotonic())
         for topic in list(self._unheard):
             self._subscribe_to_offers(topic)
         self._unheard.clear()
@@ -66,23 +73,25 @@ class RawTopics:
         kind = message_class(type_name)
         qos = self._offered(topic)
         take = self._open(name, type_name, qos.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL)
-        is_clock, lock = name == topics.CLOCK.name, SourceLock()
+        is_clock, lock = name == topics.CLOCK.name, SourceLock(partial(identities, self._node, topic))
         stamped = is_clock or "std_msgs/Header" in list(kind.get_fields_and_field_types().values())[:1]
 
-        def receive(data: bytes, about: dict[str, Any]) -> None:
-            stamp = first_stamp(data) if stamped else self._time
+        if is_clock:
+            self._clocks.append(lock)
+
+        def receive(data: bytes, about: Information) -> None:
+            stamp = -1
+            with suppress(ConfigurationError):
+                stamp = first_stamp(data) if stamped else self._time
             if stamp < 0:  # of somebody else's making: ours has no time before 0
                 stamp = self._time
-            number = about["publication_sequence_number"]
-            if is_clock and lock.accepts(stamp, number, partial(self._is_shared, topic)):
+            elif is_clock and lock.judge(about["publisher"], monotonic()) is Verdict.COUNTS:
+                lock.choose(about["publisher"])
                 self._time = stamp
-            take(data, stamp, number)
+            take(data, about | {"stamp": stamp})
 
-        self._receivers[topic] = (kind, with_information(receive))
+        self._receivers[topic] = (kind, receive)
         self._subscribe_to_offers(topic)
-
-    def _is_shared(self, topic: str) -> bool:
-        return is_shared(names(self._node.get_publishers_info_by_topic(topic)))
 
     def _name_of(self, topic: str, type_name: str) -> str | None:
         """Name of a topic within the formation; None for one of another."""
@@ -103,9 +112,9 @@ class RawTopics:
 
     def _subscribe_to_offers(self, topic: str) -> None:
         if topic in self._subscriptions:
-            self._node.destroy_subscription(self._subscriptions[topic])
+            self._subscriptions[topic].destroy()
         kind, receive = self._receivers[topic]
         events = SubscriptionEventCallbacks(incompatible_qos=lambda _: self._unheard.add(topic))
-        self._subscriptions[topic] = self._node.create_subscription(
-            kind, topic, receive, self._offered(topic), raw=True, event_callbacks=events
+        self._subscriptions[topic] = IdentifiedSubscription(
+            self._node, kind, topic, receive, self._offered(topic), events
         )

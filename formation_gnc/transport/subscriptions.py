@@ -1,20 +1,21 @@
 """Subscriptions that match every writer, whatever quality of service it offers."""
 
 import struct
-from collections.abc import Callable, Iterable
-from functools import wraps
+from collections.abc import Callable
 from typing import Any
 
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSDurabilityPolicy, QoSPolicyKind, QoSReliabilityPolicy
-from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.flight.reception import Information
+from formation_gnc.transport.identified import IdentifiedSubscription
 from formation_gnc.transport.qos import quality
 from formation_gnc.types import NANOSECONDS
 
-Information = dict[str, Any]
-"""What is known of a message: `source_timestamp` (ns, system clock), `publication_sequence_number` and others."""
+_STAMP = struct.Struct("<iI")
+_BODY = 4  # bytes of the encapsulation
 
 
 def subscribe_to_all(
@@ -34,7 +35,7 @@ def subscribe_to_all(
         profile = quality(depth)
         profile.durability, profile.reliability = durability, reliability
         events = SubscriptionEventCallbacks(incompatible_qos=widen)
-        node.create_subscription(kind, topic, with_information(callback), profile, raw=True, event_callbacks=events)
+        IdentifiedSubscription(node, kind, topic, callback, profile, events)
 
     def widen(incompatible: Any) -> None:
         is_best_effort = int(incompatible.last_policy_kind) == int(QoSPolicyKind.RELIABILITY)
@@ -44,23 +45,10 @@ def subscribe_to_all(
     add(QoSDurabilityPolicy.TRANSIENT_LOCAL, QoSReliabilityPolicy.RELIABLE)
 
 
-def with_information(receive: Callable[[bytes, Information], object]) -> Callable[..., None]:
-    """Take a message and what is known of it as two arguments or, from the EventsExecutor, as one pair."""
-
-    @wraps(receive)  # rclpy looks at the signature to see whether it is wanted
-    def call(*given: Any) -> None:
-        data, about = given if len(given) == 2 else given[0]
-        receive(data, about)
-
-    return call
-
-
-def names(endpoints: Iterable[TopicEndpointInfo]) -> list[str]:
-    """Full names of the nodes that publish or subscribe."""
-    return [f"{each.node_namespace.rstrip('/')}/{each.node_name}" for each in endpoints]
-
-
 def first_stamp(data: bytes) -> int:
-    """The stamp that a message begins with, in ns: after the four bytes of the encapsulation."""
-    seconds, nanoseconds = struct.unpack_from("<iI", data, 4)
+    """The stamp that a message begins with, in ns; raises ConfigurationError for one that is too short for it."""
+    try:
+        seconds, nanoseconds = _STAMP.unpack_from(data, _BODY)
+    except struct.error:
+        raise ConfigurationError(f"{len(data)} bytes are too few for a stamp") from None
     return int(seconds * NANOSECONDS + nanoseconds)

@@ -8,8 +8,10 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from formation_gnc.flight import topics
+from formation_gnc.flight.reception import Information
 from formation_gnc.recording.live import LiveView
 from formation_gnc.recording.topic_definition import TopicDefinition
+from formation_gnc.transport.identified import unsubscribe
 from formation_gnc.transport.node import Executor
 from formation_gnc.transport.raw_topics import Callback, RawTopics
 
@@ -29,10 +31,10 @@ def show_graph(view: LiveView, ended: Callable[[], bool]) -> None:
         view.add(topic, TopicDefinition.installed(type_name, topics.QUEUE_DEPTH))
         is_clock = topic == topics.CLOCK.name
 
-        def show(data: bytes, stamp: int, _number: int | None) -> None:
+        def show(data: bytes, about: Information) -> None:
             if is_clock:
-                view.broadcast_time(stamp)
-            view.show(topic, data, stamp)
+                view.broadcast_time(about["stamp"])
+            view.show(topic, data, about["stamp"])
 
         return show
 
@@ -42,5 +44,6 @@ def show_graph(view: LiveView, ended: Callable[[], bool]) -> None:
             everything.look()
             executor.spin_until_future_complete(Future(), timeout_sec=LOOK_PERIOD)
     finally:
+        unsubscribe(node)
         node.destroy_node()
         rclpy.try_shutdown(context=context)

@@ -1,89 +1,106 @@
-"""Several publishers of one topic: the one that is heard goes on to be, and the others are named."""
+"""Several publishers of one topic: the first is heard until it is gone, and the others are named."""
 
-import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from formation_gnc.flight.sources import LOOK, SUCCESSION, UNKNOWN, SourceLock, Verdict, is_shared, names_of, shared
 
-from formation_gnc.flight.sources import UNKNOWN, SourceLock, is_shared, names_of, shared
-
-TICK = 10**9
+FIRST, SECOND, THIRD = b"first", b"second", b"third"
 
 
-def flown(ticks: int, numbered: bool = True) -> SourceLock:
-    """A lock that has heard a publisher's first ticks."""
-    lock = SourceLock()
-    for tick in range(ticks):
-        assert lock.accepts(tick * TICK, tick + 1 if numbered else None, lambda: False)
+class Graph:
+    """Publishers of a topic, and how often they were asked for."""
+
+    def __init__(self, **names: str) -> None:
+        self.names = {identity.encode(): name for identity, name in names.items()}
+        self.asked = 0
+
+    def __call__(self) -> dict[bytes, str]:
+        self.asked += 1
+        return self.names
+
+
+def heard(graph: Graph) -> SourceLock:
+    """A lock that keeps to the first publisher."""
+    lock = SourceLock(graph)
+    assert lock.judge(FIRST, 0.0) is Verdict.COUNTS
+    lock.choose(FIRST)
     return lock
 
 
-def test_alone_a_publisher_may_skip_go_back_and_begin_again() -> None:
-    lock = flown(5)
-    for tick, number in ((9, 6), (9, 6), (3, 7), (0, 1), (1, 2)):
-        assert lock.accepts(tick * TICK, number, lambda: False)
-    assert lock.ignored == 0
+def test_a_second_publisher_is_refused_whatever_it_sends_and_however_often() -> None:
+    lock = heard(Graph(first="/plant", second="/player"))
+    for now in range(100):
+        assert lock.judge(SECOND, float(now)) is Verdict.REFUSED
+        assert lock.judge(FIRST, now + 0.5) is Verdict.COUNTS
+        assert not lock.succeeds(now + 0.5)
+    assert lock.refused == {"/player": 100}
 
 
-@pytest.mark.parametrize("numbered", [True, False])
-def test_an_earlier_message_of_another_does_not_count(numbered: bool) -> None:
-    lock = flown(5, numbered)
-    assert not lock.accepts(0, 1 if numbered else None, lambda: True)
-    assert lock.accepts(5 * TICK, 6 if numbered else None, lambda: True)
-    assert lock.ignored == 1
+def test_one_whose_message_was_of_no_use_is_not_kept_to() -> None:
+    lock = SourceLock(Graph(first="/plant", second="/player"))
+    assert lock.judge(SECOND, 0.0) is Verdict.COUNTS  # and does not fit: it is not chosen
+    assert lock.judge(FIRST, 0.0) is Verdict.COUNTS
+    lock.choose(FIRST)
+    assert lock.judge(SECOND, 1.0) is Verdict.REFUSED
 
 
-@given(joined=st.integers(1, 60), bursts=st.lists(st.integers(0, 30), max_size=20))
-def test_a_bag_of_the_same_ticks_that_is_played_into_a_flight_never_counts(joined: int, bursts: list[int]) -> None:
-    """Also where it overtakes the flight; only a burst that ends level with it cannot be told from the flight."""
-    lock, tick, played = flown(joined), joined, 0
-    for burst in bursts:
-        for _ in range(burst + (played + burst == tick)):
-            assert not lock.accepts(played * TICK, played + 1, lambda: True)
-            played += 1
-        assert lock.accepts(tick * TICK, tick + 1, lambda: True)
-        tick += 1
-    assert lock.ignored == played
+def test_another_node_succeeds_at_once_when_the_first_has_left_the_graph() -> None:
+    graph = Graph(first="/plant", second="/replay")
+    lock = heard(graph)
+    assert lock.judge(SECOND, 1.0) is Verdict.REFUSED
+    del graph.names[FIRST]
+    assert lock.judge(SECOND, 1.0 + LOOK) is Verdict.COUNTS
+    assert lock.chosen == SECOND
 
 
-def test_one_that_is_started_again_counts_when_the_others_have_gone() -> None:
-    lock = flown(5)
-    for tick in range(3):
-        assert not lock.accepts(tick * TICK, tick + 1, lambda: True)
-    assert not lock.accepts(3 * TICK, 4, lambda: False), "what was on its way from them"
-    for tick in range(3):
-        assert lock.accepts(tick * TICK, tick + 1, lambda: False)
-    for tick in range(3, 6):
-        assert lock.accepts(tick * TICK, tick + 1, lambda: True)
+def test_a_node_started_again_succeeds_its_killed_process_after_a_silence() -> None:
+    lock = heard(Graph(first="/deputy1/navigation", second="/deputy1/navigation"))
+    assert lock.judge(SECOND, 1.0) is Verdict.HELD
+    assert not lock.succeeds(1.0 + 0.9 * SUCCESSION)
+    assert lock.succeeds(1.0 + SUCCESSION)
+    assert lock.judge(SECOND, 2.0) is Verdict.COUNTS
 
 
-def test_a_node_started_again_counts_before_its_name_is_known() -> None:
-    lock = flown(5)
-    for tick, second in (
-        (9, f"/{UNKNOWN}"),
-        (10, f"/{UNKNOWN}"),
-        (11, "/deputy1/navigation"),
-        (12, "/deputy1/navigation"),
-    ):
-        assert lock.accepts(tick * TICK, tick - 8, lambda second=second: is_shared(["/deputy1/navigation", second]))
-    assert lock.ignored == 0
+def test_a_second_process_of_the_same_name_never_counts_while_the_first_goes_on() -> None:
+    lock = heard(Graph(first="/deputy1/controller", second="/deputy1/controller"))
+    for now in (1.0, 2.0, 3.0):
+        assert lock.judge(SECOND, now) is not Verdict.COUNTS
+        assert lock.judge(FIRST, now + 0.1) is Verdict.COUNTS
+        assert not lock.succeeds(now + 0.9)
+    assert lock.refused == {"/deputy1/controller": 2}
 
 
-def test_a_stranger_without_a_name_yet_does_not_take_over() -> None:
-    lock = flown(5)
-    assert lock.accepts(90 * TICK, 1, lambda: is_shared(["/plant", f"/{UNKNOWN}"])), "as a plant that is started again"
-    for tick in range(5, 9):
-        assert lock.accepts(tick * TICK, tick + 1, lambda: True)
-        assert not lock.accepts((86 + tick) * TICK, tick - 3, lambda: True)
+def test_a_process_that_was_only_slow_counts_again_and_its_successor_does_not() -> None:
+    lock = heard(Graph(first="/deputy1/controller", second="/deputy1/controller"))
+    assert lock.judge(SECOND, 1.0) is Verdict.HELD
+    assert lock.succeeds(2.0)
+    assert lock.judge(FIRST, 3.0) is Verdict.COUNTS
+    assert lock.judge(SECOND, 3.1) is Verdict.REFUSED
+    assert not lock.succeeds(9.0)
 
 
-def test_the_graph_is_asked_only_about_what_does_not_follow() -> None:
-    lock = SourceLock()
+def test_a_stranger_without_a_name_yet_is_held_and_does_not_take_over() -> None:
+    graph = Graph(first="/plant", second=f"/{UNKNOWN}")
+    lock = heard(graph)
+    assert lock.judge(SECOND, 1.0) is Verdict.HELD
+    graph.names[SECOND] = "/stranger"
+    assert not lock.succeeds(2.0)
+    assert lock.judge(SECOND, 3.0) is Verdict.REFUSED
+    assert lock.judge(FIRST, 3.0) is Verdict.COUNTS
 
-    def unasked() -> bool:
-        pytest.fail("asked")
 
-    for tick in range(3):
-        assert lock.accepts(tick * TICK, tick + 1, unasked)
+def test_a_flood_of_a_stranger_asks_the_graph_ten_times_a_second() -> None:
+    graph = Graph(first="/plant", second="/player")
+    lock = heard(graph)
+    for number in range(10_000):
+        lock.judge(SECOND, 1.0 + number * 1e-4)
+    assert graph.asked <= 1.0 / LOOK + 1
+
+
+def test_the_one_that_counts_never_asks_the_graph() -> None:
+    graph = Graph(first="/plant")
+    lock = heard(graph)
+    for now in range(3):
+        assert lock.judge(FIRST, float(now)) is Verdict.COUNTS
+    assert graph.asked == 0
 
 
 def test_a_node_started_again_is_no_stranger_and_two_of_a_name_are_counted() -> None:

@@ -168,11 +168,12 @@ def test_the_recorder_stands_any_message_of_any_topic(
     for topic, record_type in ours:
         wrong = data.draw(st.booleans())
         take = session.open_topic(
-            topic, "std_msgs/msg/String" if wrong else type_name(record_type), lambda: ["/somebody"], True
+            topic, "std_msgs/msg/String" if wrong else type_name(record_type), lambda: {b"": "/somebody"}, True
         )
         for _ in range(2):
             message = b"\0\1\0\0\1\0\0\0\0" if wrong else to_cdr(data.draw(any_record(record_type)))
-            take(message, data.draw(st.integers(0, 2**62)), data.draw(st.integers(1, 3)))
+            about = {"stamp": data.draw(st.integers(0, 2**62)), "publisher": data.draw(st.binary(max_size=1))}
+            take(message, about | {"publication_sequence_number": data.draw(st.integers(1, 3))})
     session.report_progress()
     session.put_on_record("/foreign", "parameters /foreign", {"raw": [b"\1", b"\2"], "none": [], "nan": float("nan")})
     session.close()
