@@ -10,7 +10,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from formation_gnc.bounds import at_most, bounded, each, finite_state, orbit, within
 from formation_gnc.types import Matrix, Times, Vector
+
+NAME_LENGTH, LIST_LENGTH, ROWS = 1000, 1000, 20_000
+"""Longest name, list of values of a sensor or of a measurement, and list of states, beyond any use."""
 
 
 class Record:
@@ -98,8 +102,8 @@ class Reading(Record):
 
     message: ClassVar = "Reading"
 
-    sensor: str
-    values: list[float]
+    sensor: str = field(metadata=bounded(at_most(NAME_LENGTH)))
+    values: list[float] = field(metadata=bounded(at_most(LIST_LENGTH)))
     age: int
 
 
@@ -111,9 +115,9 @@ class Measurement(Record):
     frame_id: ClassVar = "inertial"
 
     time: int
-    deputy: str
+    deputy: str = field(metadata=bounded(at_most(NAME_LENGTH)))
     chief_state: Vector  # (6,)
-    readings: list[Reading]
+    readings: list[Reading] = field(metadata=bounded(each(LIST_LENGTH)))
     applied_force: Vector  # (3,)
     mass: float
     eclipse: bool
@@ -152,9 +156,9 @@ class NavigationState(Record):
     frame_id: ClassVar = "hill"
 
     time: int
-    relative_state: Vector  # (6,)
-    chief_state: Vector  # (6,)
-    mass: float
+    relative_state: Vector = field(metadata=bounded(finite_state))  # (6,)
+    chief_state: Vector = field(metadata=bounded(orbit))  # (6,)
+    mass: float = field(metadata=bounded(within(0.0, 1e9)))
 
 
 @dataclass(slots=True)
@@ -183,12 +187,13 @@ class Target(Record):
     frame_id: ClassVar = "hill"
 
     time: int
-    formation: str
-    relative_state: Vector  # (6,)
-    preview_step: int
-    preview: Matrix  # (N, 6), a row for each RelativeState
-    eclipses: Times = field(default_factory=lambda: NO_ECLIPSES)  # (N, 2), a row for each Interval
-    neighbours: Matrix = field(default_factory=lambda: NO_NEIGHBOURS)  # (N, 6), a row for each RelativeState
+    formation: str = field(metadata=bounded(at_most(NAME_LENGTH)))
+    relative_state: Vector = field(metadata=bounded(finite_state))  # (6,)
+    preview_step: int = field(metadata=bounded(within(1, 2**63 - 1)))
+    preview: Matrix = field(metadata=bounded(at_most(ROWS, finite_state)))  # (N, 6), a row for each RelativeState
+    eclipses: Times = field(default_factory=lambda: NO_ECLIPSES, metadata=bounded(at_most(ROWS)))  # (N, 2), by Interval
+    neighbours: Matrix = field(default_factory=lambda: NO_NEIGHBOURS, metadata=bounded(at_most(ROWS, finite_state)))
+    """(N, 6), a row for each RelativeState."""
 
 
 @dataclass(slots=True)
@@ -260,9 +265,9 @@ class SatelliteTruth(Record):
 
     message: ClassVar = "SatelliteTruth"
 
-    name: str
-    inertial_state: Vector  # (6,)
-    relative_state: Vector  # (6,)
+    name: str = field(metadata=bounded(at_most(NAME_LENGTH)))
+    inertial_state: Vector = field(metadata=bounded(finite_state))  # (6,)
+    relative_state: Vector = field(metadata=bounded(finite_state))  # (6,)
     applied_force: Vector  # (3,)
     mass: float
     eclipse: bool
@@ -276,8 +281,8 @@ class Truth(Record):
     frame_id: ClassVar = "inertial"
 
     time: int
-    chief_state: Vector  # (6,)
-    deputies: list[SatelliteTruth]
+    chief_state: Vector = field(metadata=bounded(orbit))  # (6,)
+    deputies: list[SatelliteTruth] = field(metadata=bounded(each(ROWS)))
 
 
 @dataclass(slots=True)

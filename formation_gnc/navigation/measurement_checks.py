@@ -19,6 +19,9 @@ FORGET_EVERY = 64
 LARGEST_RADIUS, LARGEST_SPEED = 1e9, 1.2e4
 """Beyond any orbit about the Earth, m and m/s."""
 
+LEAST_SPEED_ACROSS = 1.0
+"""Below any orbit that stays above the ground, m/s: a chief has a Hill frame and a period by it."""
+
 LARGEST_ACCELERATION = 100.0
 """Beyond any thruster, m/s^2."""
 
@@ -167,8 +170,8 @@ def is_plausible_chief(chief: Vector) -> bool:
         return False
     square, speed = x * x + y * y + z * z, vx * vx + vy * vy + vz * vz
     radial = x * vx + y * vy + z * vz
-    across = square * speed - radial * radial
-    return EARTH_RADIUS**2 < square < LARGEST_RADIUS**2 and across > 1.0 and speed < LARGEST_SPEED**2
+    across = square * speed - radial * radial > square * LEAST_SPEED_ACROSS**2
+    return EARTH_RADIUS**2 < square < LARGEST_RADIUS**2 and across and speed < LARGEST_SPEED**2
 
 
 def is_plausible_mass(mass: float) -> bool:

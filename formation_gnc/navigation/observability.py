@@ -44,7 +44,7 @@ def gramian(chief: Vector, variance: dict[str, tuple[float, ...]], window: float
     """
     codes = measurement_model(tuple(variance)).codes
     weight = 1.0 / np.array([each for values in variance.values() for each in values])
-    step = orbit_period(chief) / STEPS_PER_ORBIT
+    step = min(orbit_period(chief) / STEPS_PER_ORBIT, window)  # a chief with little speed across has a long period
     total, since = np.zeros((6, 6)), np.eye(6)
     for _ in range(max(1, round(window / step))):
         _, jacobian = measure_relative(codes, chief, state)

@@ -90,9 +90,8 @@ class DisplayNode(ConfiguredNode):
                 self._targets[deputy.name] = None
                 self.subscribe(Target, topics.TARGET.of(deputy.name), partial(self._on_target, deputy.name))
         targets = {name: target for name, target in self._targets.items() if target}
-        size = self.values.size or max(
-            1.0, max(float(np.linalg.norm(each.relative_state[:3])) for each in truth.deputies) / 40.0
-        )
+        distances = [float(np.linalg.norm(each.relative_state[:3])) for each in truth.deputies]
+        size = self.values.size or max(1.0, max(distances, default=0.0) / 40.0)
         self._publish_transforms(list(transforms(truth)))
         self._marker_publisher.publish(MarkerArray(markers=list(markers(truth, targets, self._trails, size))))
 

@@ -4,13 +4,14 @@ rclpy's message objects would take three times as long for the same bytes.
 """
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib import import_module
 from typing import Any, get_args, get_origin, get_type_hints
 
 from rclpy.serialization import deserialize_message, serialize_message
 from rosidl_parser.definition import Array, BasicType, NamespacedType, UnboundedString
 
+from formation_gnc.bounds import checked, has_bounds
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.records import Record
 from formation_gnc.transport import fields as cdr_fields
@@ -58,6 +59,15 @@ def to_cdr(record: Record) -> bytes:
 def from_cdr[T: Record](record_type: type[T], data: bytes) -> T:
     """The record with the contents of a message; raises ConfigurationError when the bytes do not fit it."""
     return codec(record_type).decode(data)
+
+
+def received[T: Record](record_type: type[T]) -> Callable[[bytes], T]:
+    """Decoder of messages from elsewhere.
+
+    It raises ConfigurationError for bytes that do not fit the record, and for a value out of the record's bounds.
+    """
+    decode = codec(record_type).decode
+    return (lambda data: checked(decode(data))) if has_bounds(record_type) else decode
 
 
 def codec[T: Record](record_type: type[T]) -> Codec[T]:

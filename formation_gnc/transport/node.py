@@ -30,7 +30,7 @@ from formation_gnc.flight.topics import QUEUE_DEPTH
 from formation_gnc.parameters import OWN_OF_ROS, Leaf, change, dump, leaves, load, read_yaml
 from formation_gnc.records import WARNINGS, Event, EventKind
 from formation_gnc.sil.following import departures, values_of_plant, with_followed
-from formation_gnc.transport.conversion import codec, message_type
+from formation_gnc.transport.conversion import codec, message_type, received
 from formation_gnc.transport.identified import identities, unsubscribe
 from formation_gnc.transport.parameter_arguments import given_parameters, without_parameters
 from formation_gnc.transport.process import stop_requested
@@ -178,7 +178,7 @@ class ConfiguredNode(Node):  # type: ignore[misc]
         depth: messages kept between two callbacks, of all publishers: a burst of a stranger's must not push out the one
         that is awaited. decode: what to make of a message; its record by default.
         """
-        reception = Reception(topic, decode or codec(record).decode, take, partial(self.identities_on, topic))
+        reception = Reception(topic, decode or received(record), take, partial(self.identities_on, topic))
         self.receptions.append(reception)
         subscribe_to_all(self, message_type(record), self.full_name(topic), reception.receive, depth)
         return reception

@@ -85,7 +85,7 @@ def test_messages_of_a_node_started_again_are_held_not_lost(
     assert taken == ["one", "two", "three"]
 
 
-def test_what_was_held_of_a_second_process_is_dropped_when_the_first_goes_on(
+def test_what_a_second_process_sent_is_dropped_when_the_first_goes_on(
     reception: Reception[str], taken: list[str], clock: Clock
 ) -> None:
     reception.receive(b"one", about(b"own"))

@@ -59,7 +59,7 @@ def test_a_node_started_again_succeeds_its_killed_process_after_a_silence() -> N
     assert lock.judge(SECOND, 2.0) is Verdict.COUNTS
 
 
-def test_a_second_process_of_the_same_name_never_counts_while_the_first_goes_on() -> None:
+def test_a_second_process_of_the_name_never_counts_while_the_first_goes_on() -> None:
     lock = heard(Graph(first="/deputy1/controller", second="/deputy1/controller"))
     for now in (1.0, 2.0, 3.0):
         assert lock.judge(SECOND, now) is not Verdict.COUNTS
@@ -68,7 +68,7 @@ def test_a_second_process_of_the_same_name_never_counts_while_the_first_goes_on(
     assert lock.refused == {"/deputy1/controller": 2}
 
 
-def test_a_process_that_was_only_slow_counts_again_and_its_successor_does_not() -> None:
+def test_a_process_that_was_slow_counts_again_and_its_successor_does_not() -> None:
     lock = heard(Graph(first="/deputy1/controller", second="/deputy1/controller"))
     assert lock.judge(SECOND, 1.0) is Verdict.HELD
     assert lock.succeeds(2.0)

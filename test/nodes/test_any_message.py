@@ -21,7 +21,7 @@ from formation_gnc.records import Event, Record
 from formation_gnc.sil.plant_executive import PlantExecutive
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import Scenario, load_scenario
-from formation_gnc.transport.conversion import codec, from_cdr, message_type, to_cdr, type_name
+from formation_gnc.transport.conversion import codec, from_cdr, message_type, received, to_cdr, type_name
 
 NAMES = st.sampled_from(["", "deputy1", "radius", "range_rate", "latitude", "lqr", "gate", "ä\U0001f6f0", "x" * 300])
 DOUBLES = st.floats(width=64) | st.sampled_from([0.0, 1.0, 1e-300, 1e308, float("nan"), float("inf")])
@@ -115,7 +115,7 @@ def test_a_module_stands_any_message_and_answers_the_next_tick(
         take(topic, from_cdr(kind, to_cdr(flown[topic][0])))
     name = hostile.topic.of("deputy1" if hostile in row.takes else "deputy2")
     for _ in range(2):
-        bad = from_cdr(hostile.record, data.draw(messages(hostile)))
+        bad = received(hostile.record)(data.draw(messages(hostile)))
         bad.time = data.draw(st.sampled_from([bad.time, 10**9]))
         for topic, kind in everything.items():
             record = (
