@@ -81,7 +81,7 @@ def each(count: int) -> Bound:
 
 def violation(record: Any) -> str:
     """The first value of a record that is out of its bounds and what it must be, in words; empty for none."""
-    for name, bound in _bounds(type(record)):
+    for name, bound in _bounds(record.__class__):
         value = getattr(record, name)
         allowed = bound(value)
         if allowed:

@@ -2,9 +2,11 @@
 
 import math
 import re
-from typing import Any, NoReturn
+from typing import Any
 
 import yaml
+
+from formation_gnc.limited_yaml import LimitedLoader, reject
 
 _TRUE = {"y", "Y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"}
 _FALSE = {"n", "N", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"}
@@ -14,11 +16,7 @@ _HEXADECIMAL = re.compile(r"[-+]?0[xX]([0-9a-fA-F]+\.?[0-9a-fA-F]*|\.[0-9a-fA-F]
 _SPECIAL = re.compile(r"([-+]?)\.?(nan|inf|infinity)", re.IGNORECASE)
 
 
-class RejectedYamlError(yaml.YAMLError):
-    """Valid YAML that ROS 2 refuses, with its line."""
-
-
-class ParameterLoader(yaml.SafeLoader):
+class ParameterLoader(LimitedLoader):
     """Loader that gives every value as ROS 2 would, and raises yaml.YAMLError for what ROS 2 refuses."""
 
     yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012 - the base's kind of attribute
@@ -26,7 +24,7 @@ class ParameterLoader(yaml.SafeLoader):
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         """Compose a node; rejects aliases."""
         if self.check_event(yaml.AliasEvent):
-            _reject(self.peek_event().start_mark, "aliases are not allowed")  # type: ignore[no-untyped-call]
+            reject(self.peek_event().start_mark, "aliases are not allowed")  # type: ignore[no-untyped-call]
         return super().compose_node(parent, index)
 
 
@@ -65,11 +63,11 @@ def _construct_scalar(loader: ParameterLoader, node: yaml.ScalarNode) -> Any:
 
 def _construct_list(loader: ParameterLoader, node: yaml.SequenceNode) -> list[Any]:
     if not all(isinstance(item, yaml.ScalarNode) for item in node.value):
-        _reject(node.start_mark, "a list must hold plain values only")
+        reject(node.start_mark, "a list must hold plain values only")
     values = [loader.construct_object(item) for item in node.value]
     kinds = sorted({type(value).__name__ for value in values})
     if len(kinds) > 1:
-        _reject(node.start_mark, f"the values of a list must be of one type, not {' and '.join(kinds)}")
+        reject(node.start_mark, f"the values of a list must be of one type, not {' and '.join(kinds)}")
     return values
 
 
@@ -77,15 +75,11 @@ def _construct_mapping(loader: ParameterLoader, node: yaml.MappingNode) -> dict[
     mapping: dict[str, Any] = {}
     for key, value in node.value:
         if not isinstance(key, yaml.ScalarNode):
-            _reject(key.start_mark, "a name must be plain text")
+            reject(key.start_mark, "a name must be plain text")
         if key.value in mapping:
-            _reject(key.start_mark, f"{key.value} is given twice")
+            reject(key.start_mark, f"{key.value} is given twice")
         mapping[key.value] = loader.construct_object(value, deep=True)
     return mapping
-
-
-def _reject(mark: Any, reason: str) -> NoReturn:
-    raise RejectedYamlError(f"line {mark.line + 1}: {reason}")
 
 
 ParameterLoader.add_constructor("tag:yaml.org,2002:str", _construct_scalar)

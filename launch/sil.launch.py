@@ -7,13 +7,13 @@ It can be included, below a namespace too: each namespace is a formation of its 
 
 from pathlib import Path
 
-import yaml
 from ament_index_python.packages import get_package_share_directory
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from formation_gnc.flight.graph import MODULES
+from formation_gnc.parameters import read_yaml
 from launch import LaunchContext, LaunchDescription
 
 ARGUMENTS = {
@@ -97,7 +97,7 @@ def deputies(files: list[str]) -> list[str]:
     """Names of the deputies that parameter files give the plant."""
     names = ["deputy1"]
     for file in files:
-        sections = yaml.safe_load(Path(file).read_text()) or {}
+        sections = read_yaml(Path(file).read_text()) or {}
         for pattern in ("/**", "plant", "/plant", "/**/plant"):
             names = sections.get(pattern, {}).get("ros__parameters", {}).get("deputies", names)
     return names

@@ -22,6 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help="directory to make (default: BAG_recovered)",
     )
+    parser.add_argument("--verify", action="store_true", help="decode every message, and write nothing")
     parser.add_argument("--json", action="store_true", help="print the result as one JSON object")
 
 
@@ -29,7 +30,8 @@ def run(options: argparse.Namespace) -> int:
     """Recover the bag and print what is lost."""
     bag = options.bag.absolute()
     try:
-        recovery = recover(options.bag, options.output or bag.with_name(f"{bag.stem}_recovered"))
+        output = None if options.verify else options.output or bag.with_name(f"{bag.stem}_recovered")
+        recovery = recover(options.bag, output)
     except OSError as error:
         print(f"formation-gnc: {error.filename}: {error.strerror}", file=sys.stderr)
         return NOTHING_SAVED
@@ -44,6 +46,8 @@ def run(options: argparse.Namespace) -> int:
         print(f"{recovery.saved} messages saved in {recovery.output}")
     elif recovery.status == NOTHING_SAVED:
         print("nothing to save")
+    elif recovery.reasons:
+        print(f"{recovery.saved} messages can be saved")
     else:
         print(f"whole: {recovery.saved} messages")
     return recovery.status

@@ -1,7 +1,6 @@
 """All messages of a bag's files by topic: which are read, in which order they stand, and what is left out."""
 
 from array import array
-from collections import Counter
 from collections.abc import Collection, Iterator
 from functools import cached_property
 from pathlib import Path
@@ -55,8 +54,8 @@ class BagContents:
         self._counts: dict[str, int] = {}
         for topic, candidates in self._candidates().items():
             self._choose(topic, candidates)
-        for topic, misfits in self._misfits().items():
-            self.remarks.append(f"skipped: {misfits} messages of {topic} that do not fit their type")
+        for topic, (misfits, first) in self._misfits().items():
+            self.remarks.append(f"skipped: {misfits} messages of {topic} that do not fit their type, first {first}")
         if orphans := sum(file.orphans for file in files):
             self.remarks.append(f"skipped: {orphans} messages of topics that no file defines")
 
@@ -69,13 +68,15 @@ class BagContents:
                 counts[series] = counts.get(series, 0) + len(file.stamps(series))
         return found
 
-    def _misfits(self) -> Counter[str]:
-        """Number of messages that cannot be decoded, by topic."""
-        found: Counter[str] = Counter()
+    def _misfits(self) -> dict[str, tuple[int, str]]:
+        """Number of messages that cannot be decoded, and where the first one stands, by topic."""
+        found: dict[str, tuple[int, str]] = {}
         for file in self._files:
             for series in file.definitions:
-                found[series.topic] += file.misfits(series)
-        return +found
+                if misfits := file.misfits(series):
+                    count, first = found.get(series.topic, (0, file.first_misfit(series)))
+                    found[series.topic] = count + misfits, first
+        return found
 
     def _choose(self, topic: str, candidates: dict[Series, int]) -> None:
         """Read the series of the run's type, or else the fullest, with those laid out alike."""

@@ -9,6 +9,7 @@ import yaml
 import zstandard
 
 from formation_gnc.errors import BagError
+from formation_gnc.limited_yaml import load_limited
 from formation_gnc.recording.mcap_file import McapFile, file_number
 from formation_gnc.recording.stored_file import StoredFile
 
@@ -102,7 +103,7 @@ def _decompressed(data: bytes) -> bytes:
 def _metadata(path: Path) -> dict[str, Any]:
     """Contents of the bag's metadata.yaml; empty where there is none that can be read."""
     try:
-        document = yaml.safe_load((path / "metadata.yaml").read_text(encoding="utf-8"))
+        document = load_limited((path / "metadata.yaml").read_text(encoding="utf-8"))
     except (OSError, ValueError, yaml.YAMLError):
         return {}
     information = document.get("rosbag2_bagfile_information") if isinstance(document, dict) else None

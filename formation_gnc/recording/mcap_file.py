@@ -35,6 +35,8 @@ UNREADABLE = (
 _RECORD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
 _FOOTER = struct.Struct("<BQQQI")
+_CHECKSUM = struct.Struct("<I")
+_BLOCK = 1 << 20  # bytes read at once
 _PRIVATE = 0x80  # first opcode of others' records
 
 FileRecord = Message | Schema | Channel | Chunk | Metadata | Attachment
@@ -89,6 +91,8 @@ class McapFile(StoredFile):
             self.damage = f"{self.path}: cut or damaged at byte {error.offset} ({error})"
         if not is_finished and self.damage is None:
             self.damage = f"{self.path}: cut: it was not closed, what came last may be missing"
+        if is_finished and not data_section_is_intact(stream):
+            raise BagError(f"{self.path}: damaged (the checksum of its data section is wrong); recover it first")
         if outside.start <= outside.end:
             ends = [*self.spans, outside]
             self.spans = [Span(None, min(span.start for span in ends), max(span.end for span in ends))]
@@ -198,6 +202,35 @@ def _is_finished(stream: BinaryIO) -> bool:
     end = stream.read()
     stream.seek(len(MAGIC))
     return end[:1] == bytes([Opcode.FOOTER]) and end[-len(MAGIC) :] == MAGIC
+
+
+def data_section_is_intact(stream: BinaryIO) -> bool:
+    """Whether the checksum of all that stands before a file's summary holds; True where the file has none.
+
+    It alone covers metadata, such as recorded parameters, and definitions outside chunks.
+    """
+    size, offset = stream.seek(0, SEEK_END), len(MAGIC)
+    stream.seek(0)
+    if stream.read(len(MAGIC)) != MAGIC:
+        return True
+    while offset + _RECORD.size <= size:
+        stream.seek(offset)
+        opcode, length = _RECORD.unpack(stream.read(_RECORD.size))
+        if opcode == Opcode.DATA_END:
+            (expected,) = _CHECKSUM.unpack(stream.read(_CHECKSUM.size))
+            return not expected or _checksum(stream, offset) == expected
+        offset += _RECORD.size + length
+    return True
+
+
+def _checksum(stream: BinaryIO, size: int) -> int:
+    """CRC-32 of a file's first bytes."""
+    stream.seek(0)
+    checksum = 0
+    while size:
+        block = stream.read(min(size, _BLOCK))
+        checksum, size = zlib.crc32(block, checksum), size - len(block)
+    return checksum
 
 
 def verified_summary(stream: BinaryIO) -> Summary | None:

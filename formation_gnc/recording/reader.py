@@ -62,7 +62,9 @@ class Bag:
         self.path = Path(path)
         self._contents = contents = BagContents(self.path)
         self.metadata, self.attachments, self.damage = contents.metadata, contents.attachments, contents.damage
-        self.lost = sum(int(count) for count in self.metadata.get(LOST, {}).values() if count.isdecimal())
+        counts = self.metadata.get(LOST, {})
+        self.lost = sum(int(count) for count in counts.values() if _is_count(count))
+        self._unread_counts = [f"{topic} ({count[:20]!r})" for topic, count in counts.items() if not _is_count(count)]
         self._error: BagError | None = None
         self._orders: list[RunOrder] = []
         try:
@@ -100,6 +102,8 @@ class Bag:
             lines.append(f"{len(self._orders)} runs are in it, one after the other")
         if self._error is not None:
             lines.append(str(self._error))
+        if self._unread_counts:
+            lines.append(f"how many messages were lost is not known of {', '.join(self._unread_counts[:5])}")
         ignored = self.metadata.get(IGNORED, {})
         if ignored:
             named = ", ".join(f"{count} of {topic}" for topic, count in ignored.items())
@@ -333,3 +337,8 @@ def columns(arrays: Arrays) -> Arrays:
             for index in range(array.shape[1]):
                 flat[f"{field}.{index}"] = array[:, index]
     return flat
+
+
+def _is_count(text: str) -> bool:
+    """Whether a text is a number of messages: decimal, within 64 bits."""
+    return text.isdecimal() and len(text) < 20

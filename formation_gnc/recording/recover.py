@@ -11,7 +11,7 @@ from mcap.summary import Summary
 
 from formation_gnc.errors import BagError
 from formation_gnc.recording.files import COMPRESSED, bag_files, missing_files, unpacker
-from formation_gnc.recording.mcap_file import verified_summary
+from formation_gnc.recording.mcap_file import data_section_is_intact, verified_summary
 from formation_gnc.recording.salvage import Group, SalvageReader
 from formation_gnc.recording.sqlite_salvage import SqliteSalvage
 from formation_gnc.recording.stored_file import Series, type_of
@@ -39,15 +39,15 @@ class Recovery:
     """What is damaged, one line each."""
 
 
-def recover(path: Path, output: Path) -> Recovery:
-    """Write everything that is readable in a bag into a new bag with an index.
+def recover(path: Path, output: Path | None) -> Recovery:
+    """Decode everything in a bag and write what is readable into a new bag with an index.
 
     A bag that is whole is left alone. From a chunk whose checksum is wrong, messages are saved as far as the
     chunk can be unpacked; `reasons` says so. The new bag's metadata record "recovery" repeats what was lost.
 
     Args:
         path: bag directory, .mcap or .db3 file.
-        output: directory of the new bag, which must not exist.
+        output: directory of the new bag, which must not exist; None to write nothing.
 
     Raises:
         BagError: the bag does not exist, or the output does.
@@ -65,7 +65,8 @@ def recover(path: Path, output: Path) -> Recovery:
         return Recovery(WHOLE, None, saved, {}, ())
     reasons += tuple(_leave_out_other_types(surveys, lost))
     saved = sum(survey.saved.total() for survey in surveys)
-    _write(surveys, output, {"source": str(path), "lost": str(dict(lost)), "reasons": "\n".join(reasons)})
+    if output is not None:
+        _write(surveys, output, {"source": str(path), "lost": str(dict(lost)), "reasons": "\n".join(reasons)})
     return Recovery(PARTLY_LOST if reasons else WHOLE, output, saved, dict(lost), reasons)
 
 
@@ -85,6 +86,21 @@ class _Survey:
     lost: Counter[str] = field(default_factory=Counter)
     """Messages known to be missing, by topic."""
     reasons: list[str] = field(default_factory=list)
+    misfits: dict[str, tuple[int, str]] = field(default_factory=dict)
+    """By topic, how many messages do not fit their type, and where the first one stands."""
+
+    def note_misfits(self, group: Group, saved: Counter[int]) -> None:
+        """Note the messages of a group that do not fit, after so many of each channel that do."""
+        for record in group.records:
+            if not isinstance(record, Message):
+                continue
+            if self._fits(record):
+                saved[record.channel_id] += 1
+                continue
+            topic = self.channels[record.channel_id].topic
+            place = f"message {saved[record.channel_id] + 1} of the topic, recorded at {record.log_time / 1e9:g} s"
+            count, first = self.misfits.get(topic, (0, place))
+            self.misfits[topic] = count + 1, first
 
     def add_definitions(self, group: Group) -> None:
         """Take the schemas and channels that are not known yet."""
@@ -146,9 +162,9 @@ def _surveyed(path: Path, unpack: Unpack) -> _Survey:
         for record in reader.records():
             match record:
                 case Group():
-                    readable = survey.readable(record)
-                    counts = Counter(item.channel_id for item in readable if isinstance(item, Message))
-                    found.update(counts)
+                    before = found.copy()
+                    survey.note_misfits(record, found)
+                    counts = found - before
                     from_damaged = counts if record.damaged else None
                 case MessageIndex() if from_damaged is not None:
                     missing[record.channel_id] += len(record.records) - from_damaged[record.channel_id]
@@ -158,7 +174,12 @@ def _surveyed(path: Path, unpack: Unpack) -> _Survey:
                     survey.attachments[record.name] = record.data
         survey.reasons = reader.reasons
         survey.indexed = (summary is not None or isinstance(reader, SqliteSalvage)) and not reader.has_wrong_lengths
+        if not data_section_is_intact(stream):
+            survey.reasons.append(f"{path}: the checksum of its data section is wrong: parameters may be altered")
     survey.count(found, _missing(summary, found, missing))
+    for topic, (count, first) in survey.misfits.items():
+        survey.reasons.append(f"{path}: {count} messages of {topic} do not fit their type, first {first}")
+        survey.lost[topic] = max(survey.lost[topic], count)
     return survey
 
 

@@ -102,21 +102,17 @@ class _Stamps:
         """Messages equal to one before them with the same stamp."""
         self.misfits = 0
         """Messages that are none of the type: cut, or encoded otherwise."""
+        self.first_misfit = ""
+        """Where the first of them stands, in words."""
         self._same: list[bytes] = []
         self._kind: MessageType | None = None
-        self._seen: dict[tuple[bytes, int], bool] = {}
         with suppress(BagError):
             self._kind = type_of(series)
         self.has_header = self._kind is not None and self._kind.is_stamped
 
     def fits(self, data: bytes) -> bool:
-        """Whether a message is one of the type; once one of its length is, all of that length count as such."""
-        if self._kind is None:
-            return True
-        key = data[:2], len(data)
-        if key not in self._seen:
-            self._seen[key] = self._kind.fits(data)
-        return self._seen[key] or self._kind.fits(data)
+        """Whether a message is one of the type."""
+        return self._kind is None or self._kind.fits(data)
 
     def add(self, stamp: int, data: bytes) -> None:
         values = self.values
@@ -214,6 +210,10 @@ class StoredFile:
         """Messages of a series that are left out, being none of its type."""
         return self._stamps[series].misfits if series in self._stamps else 0
 
+    def first_misfit(self, series: Series) -> str:
+        """Where the first of them stands, in words."""
+        return self._stamps[series].first_misfit if series in self._stamps else ""
+
     def repeats(self, series: Series) -> int:
         """Messages of a series equal to one right before them."""
         return self._stamps[series].repeats if series in self._stamps else 0
@@ -244,6 +244,9 @@ class StoredFile:
         stamps, data = self._stamps[series], self._unpack(data)
         if not stamps.fits(data):
             stamps.misfits += 1
+            if stamps.misfits == 1:
+                place = f"message {len(stamps.values) + 1} of the topic in {self.path.name}"
+                stamps.first_misfit = f"{place}, {len(data)} bytes, recorded at {log_time / NANOSECONDS:g} s"
             return
         stamp = log_time
         if stamps.has_header:

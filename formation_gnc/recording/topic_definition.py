@@ -8,6 +8,7 @@ import yaml
 from mcap.records import Channel, Schema
 
 from formation_gnc.errors import BagError
+from formation_gnc.limited_yaml import load_limited
 from formation_gnc.recording.schema import schema_text, type_hash
 
 _INFINITE = "{sec: 9223372036, nsec: 854775807}"
@@ -42,7 +43,7 @@ class TopicDefinition:
         """Definition by an MCAP file's records; QoS profiles that are no YAML are left out."""
         metadata = dict(channel.metadata)
         try:
-            yaml.safe_load(metadata.get("offered_qos_profiles", ""))
+            load_limited(metadata.get("offered_qos_profiles", ""))
         except yaml.YAMLError:
             del metadata["offered_qos_profiles"]
         name, text, encoding = (schema.name, schema.data, schema.encoding) if schema else ("", b"", "")

@@ -10,11 +10,11 @@ from textwrap import indent
 from types import TracebackType
 from typing import BinaryIO, NoReturn, Self
 
-import yaml
 from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
 
 from formation_gnc import __version__
 from formation_gnc.errors import BagError
+from formation_gnc.limited_yaml import load_limited
 from formation_gnc.recording.bag_metadata import FileEntry, TopicEntry, bag_information
 from formation_gnc.recording.topic_definition import TopicDefinition
 
@@ -118,7 +118,7 @@ class BagWriter:
         """
         if topic in self._topics:
             raise BagError(f"topic {topic!r}: already in the bag {self.directory}")
-        qos = yaml.safe_load(definition.metadata.get("offered_qos_profiles", "[]"))
+        qos = load_limited(definition.metadata.get("offered_qos_profiles", "[]"))
         with self._guarded():
             self._register(topic, definition)
         self._topics[topic] = TopicEntry(definition, qos)

@@ -26,7 +26,7 @@ from formation_gnc.sil.simulation import Sink
 from formation_gnc.types import NANOSECONDS
 
 Decode = Callable[[str, bytes], Any]
-"""The record of a message, given its topic and CDR bytes."""
+"""The record of a message, given its topic and CDR bytes; None for one that no module takes."""
 
 Copy = Callable[[str, bytes, int], None]
 """Takes what was recorded and is not replayed: topic, CDR bytes, stamp in ns."""
@@ -199,11 +199,14 @@ class _Replay:
         """Whether the replay publishes this message's like; notes swaps and finished ticks on the way."""
         if topic == topics.EVENTS.name:
             event = self._decode(topic, data)
-            if event.node in self._nodes and event.kind == EventKind.PARAMETERS:
+            if event is None or event.node not in self._nodes or event.subject.startswith("/"):  # of its node's topics
+                return False
+            if event.kind == EventKind.PARAMETERS:
                 tick.swaps.setdefault(event.node, []).append(event)
-            return event.node in self._nodes
+            return True
         if _is_timing(topic):
-            node = f"/{topics.deputy_of(topic)}/{self._decode(topic, data).node}"
+            timing = self._decode(topic, data)
+            node = f"/{topics.deputy_of(topic)}/{timing.node if timing else ''}"
             tick.timed.add(node)
             return node in self._nodes
         return topic in self._outputs
@@ -246,7 +249,9 @@ class _Replay:
         """Copy an answer to what the bag lacks: a killed node may have reached others with it."""
         for topic in module.instance.outputs:
             for data in tick.messages.get(topic, ()):
-                records[topic] = self._decode(topic, data)
+                record = self._decode(topic, data)
+                if record is not None:
+                    records[topic] = record
                 self._copy(topic, data, tick.stamp)
         module.orphans += 1
 

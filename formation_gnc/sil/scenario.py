@@ -16,7 +16,7 @@ import yaml
 import formation_gnc
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight.graph import GRAPH, MODULES, PLANT
-from formation_gnc.parameter_yaml import RejectedYamlError
+from formation_gnc.limited_yaml import RejectedYamlError
 from formation_gnc.parameters import OWN_OF_ROS, dump, leaves, load, read_yaml
 from formation_gnc.plant.parameters import PlantParameters
 from formation_gnc.sil.following import SHARED, departures, with_followed

@@ -9,7 +9,7 @@ from formation_gnc.flight import topics
 from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.topic_definition import TopicDefinition
 from formation_gnc.recording.writer import BagWriter
-from formation_gnc.transport.conversion import from_cdr, to_cdr, type_name
+from formation_gnc.transport.conversion import received, to_cdr, type_name
 
 
 class InProcessRecorder:
@@ -40,19 +40,24 @@ class InProcessRecorder:
 def reader(bag: Bag) -> Callable[[str, bytes], Any]:
     """A function that gives the record which a message of the bag carries, by its topic and CDR bytes.
 
-    It raises ConfigurationError for a message that is not laid out as the installed type is.
+    It gives None for one that a node would not have taken either: its values are out of their bounds. It raises
+    ConfigurationError for a topic whose messages are not laid out as the installed type is.
     """
 
-    known: dict[str, Any] = {}
+    known: dict[str, Callable[[bytes], Any]] = {}
 
     def read(topic: str, data: bytes) -> Any:
-        record = known.get(topic)
-        if record is None:
+        decode = known.get(topic)
+        if decode is None:
             bag.check_type(topic)
             kind = bag.topics[topic].type_name
-            record = known[topic] = getattr(records, kind.rpartition("/")[2], None)
+            record = getattr(records, kind.rpartition("/")[2], None)
             if record is None:
                 raise ConfigurationError(f"{bag.path}: topic {topic} has messages of type {kind}")
-        return from_cdr(record, data)
+            decode = known[topic] = received(record)
+        try:
+            return decode(data)
+        except ConfigurationError:
+            return None
 
     return read

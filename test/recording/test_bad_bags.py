@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 from mcap.writer import Writer
 
 from formation_gnc.cli import main
+from formation_gnc.parameters import dump, to_json
 from formation_gnc.recording import Bag
+from formation_gnc.recording.provenance import LOST, parameters_record
 from formation_gnc.recording.topic_definition import TopicDefinition
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.sil.runner import Run
@@ -163,3 +165,79 @@ def test_truncated_and_flipped_bytes_never_raise_a_traceback(
         status = main(COMMANDS[command](directory / "bag.mcap", directory))
     assert status in (0, 1, 2, 3)
     assert capsys.readouterr().err.count("\n") <= 1
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A bag with the parameters of its nodes."""
+    scenario = load_scenario("leader_follower", {"/plant": {"duration": 20.0}})
+    modules = {f"/deputy1/{name}": each for name, each in scenario.deputies["deputy1"].items()}
+    metadata = {
+        parameters_record(node): {name: to_json(value) for name, value in dump(values).items()}
+        for node, values in ({"/plant": scenario.plant} | modules).items()
+    }
+    directory = tmp_path_factory.mktemp("flown") / "bag"
+    with BagWriter(directory, metadata) as writer:
+        Run(scenario).fly(InProcessRecorder(writer))
+    return directory
+
+
+def with_misfit(whole: Path, directory: Path, topic: str) -> Path:
+    """Copy of a bag with a message in the midst of a topic whose counts lead beyond its end, of the usual length."""
+    bag = Bag(whole)
+    with BagWriter(directory, bag.metadata, bag.attachments) as writer:
+        for name in bag.topics:
+            writer.add_defined_topic(name, TopicDefinition.recorded(*bag.definition(name)))
+        seen = 0
+        for number, (name, data, stamp) in enumerate(bag.messages()):
+            seen += name == topic
+            broken = data[:12] + b"\xff\xff\xff\x7f" + data[16:]  # the length of the header's frame
+            writer.write(name, broken if name == topic and seen == 11 else data, stamp, number)
+    return directory
+
+
+@pytest.mark.parametrize("topic", ["/deputy1/estimate", "/truth"])
+@pytest.mark.parametrize("command", [name for name in COMMANDS if name != "report"])
+def test_a_message_that_does_not_fit_is_named_with_its_place_the_rest_used(
+    flown: Path, command: str, topic: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag = with_misfit(flown, tmp_path / "misfit", topic)
+    (tmp_path / "out").mkdir()
+    status = main(COMMANDS[command](bag, tmp_path / "out"))
+    output, errors = capsys.readouterr()
+    differs = (command, topic) == ("replay", "/deputy1/estimate")  # which is flown again, and was not readable
+    assert status == (3 if command == "recover" else 1 if differs else 0), errors
+    assert f"messages of {topic}" in output
+    assert "message 11 of the topic" in output
+    assert "10 s" in output
+
+
+def test_recover_verify_finds_a_message_that_does_not_fit_and_writes_nothing(whole: Path, tmp_path: Path) -> None:
+    bag = with_misfit(whole, tmp_path / "misfit", "/deputy1/thrust")
+    before = sorted(tmp_path.rglob("*"))
+    assert main(["recover", "--verify", str(bag)]) == 3
+    assert main(["recover", "--verify", str(whole)]) == 0
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize("command", [name for name in COMMANDS if name != "report"])
+def test_a_recorded_parameter_altered_in_the_file_is_not_believed(
+    whole: Path, command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (mcap,) = whole.glob("*.mcap")
+    content = mcap.read_bytes()
+    assert b"leader_follower" in content
+    (tmp_path / "altered.mcap").write_bytes(content.replace(b"leader_follower", b"leader_fallower", 1))
+    status = main(COMMANDS[command](tmp_path / "altered.mcap", tmp_path))
+    output, errors = capsys.readouterr()
+    assert "checksum of its data section is wrong" in output + errors
+    assert status == (3 if command == "recover" else 2)
+
+
+@pytest.mark.parametrize("count", ["many", "-3", "1e9", "9" * 6000, "\N{SUPERSCRIPT TWO}", ""])
+def test_a_count_of_lost_messages_that_is_no_number_is_said(whole: Path, tmp_path: Path, count: str) -> None:
+    with BagWriter(tmp_path / "bag", {LOST: {"/truth": count, "/clock": "2"}}):
+        pass
+    bag = Bag(tmp_path / "bag")
+    assert bag.lost == 2
+    assert any("lost is not known of /truth" in remark and len(remark) < 200 for remark in bag.remarks)

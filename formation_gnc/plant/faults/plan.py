@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, get_origin
 import yaml
 
 from formation_gnc.errors import ConfigurationError, ParameterError, nearest
-from formation_gnc.parameter_yaml import RejectedYamlError
+from formation_gnc.limited_yaml import RejectedYamlError
 from formation_gnc.parameters import leaves, load, read_yaml
 from formation_gnc.plant.faults.fault import Fault
 from formation_gnc.plant.faults.registry import FAULTS
