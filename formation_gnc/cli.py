@@ -54,6 +54,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments = sys.argv[1:]
     # SIGTERM ends a run as Ctrl-C does: all processes stop and the bag is closed.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    status = _run(options)
+    if "rclpy" in sys.modules and Path(sys.argv[0]).name == parser.prog:  # the process of the command itself
+        from formation_gnc.transport.process import leave
+
+        leave(status)
+    return status
+
+
+def _run(options: argparse.Namespace) -> int:
+    """Run the command, and print what ended it in one line; returns the exit status."""
     try:
         # Import only the command that runs: the libraries of plots and reports take long to load.
         for name in arguments[:1] if set(arguments[:1]) & set(COMMANDS) else COMMANDS:

@@ -35,5 +35,9 @@ class BagError(ConfigurationError):
     """A bag that cannot be read or written, or lacks a topic or field that is asked for."""
 
 
+class RecorderLostError(RuntimeError):
+    """In flight: the recorder has died, and the run is to end with it."""
+
+
 class ImpactError(RuntimeError):
     """In flight: a satellite has come down; its state lies below the Earth's surface, or is not finite."""

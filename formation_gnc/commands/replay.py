@@ -14,6 +14,7 @@ from formation_gnc.analysis.compare import gnc_topics
 from formation_gnc.commands.reading import numbered, print_remarks, runs_of
 from formation_gnc.flight.graph import MODULES
 from formation_gnc.recording import Bag, identical
+from formation_gnc.recording.arithmetic import ARITHMETIC, difference_of_arithmetic
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -58,6 +59,9 @@ def _replay(bag: Bag, output: Path, options: argparse.Namespace) -> bool:
     differences = identical(bag, replayed, gnc_topics(bag, replayed))
     for difference in differences:
         print(f"differs: {difference}")
+    machines = difference_of_arithmetic(bag.metadata.get(ARITHMETIC, {}))
+    if differences and machines:
+        print(f"recorded with another arithmetic, which changes last bits: {machines}")
     if not differences:
         print("identical on every GNC topic")
     return not differences

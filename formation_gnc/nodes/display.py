@@ -96,6 +96,6 @@ class DisplayNode(ConfiguredNode):
         self._marker_publisher.publish(MarkerArray(markers=list(markers(truth, targets, self._trails, size))))
 
 
-def main() -> int:
+def main() -> None:
     """Run the node."""
-    return run(DisplayNode)
+    run(DisplayNode)

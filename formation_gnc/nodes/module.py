@@ -8,6 +8,6 @@ from formation_gnc.transport.module_node import ModuleNode
 from formation_gnc.transport.process import run
 
 
-def main() -> int:
+def main() -> None:
     """Run the module of the executable's name."""
-    return run(lambda: ModuleNode(MODULES[Path(sys.argv[0]).name]))
+    run(lambda: ModuleNode(MODULES[Path(sys.argv[0]).name]))

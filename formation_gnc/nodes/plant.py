@@ -16,6 +16,7 @@ from formation_gnc.sil.plant_executive import PlantExecutive
 from formation_gnc.sil.report import Report
 from formation_gnc.transport.diagnostics import RUN, DiagnosticsPublisher
 from formation_gnc.transport.node import ConfiguredNode
+from formation_gnc.transport.presence import Presence
 from formation_gnc.transport.process import run, stop_requested
 
 
@@ -33,6 +34,7 @@ class PlantNode(ConfiguredNode):
         self._diagnostics = DiagnosticsPublisher(self, self.full_name("") or "/", RUN)
         recorded = {*self._publish, *(topic for name in deputies for topic in every_tick(name))}
         self._recorded_topics = set(map(self.full_name, recorded))
+        self._presence = Presence(self)
         self.executive = PlantExecutive(self.values, self)
         for name in deputies:
             self.subscribe(Thrust, COMMAND.of(name), partial(self._on_thrust, name))
@@ -59,8 +61,8 @@ class PlantNode(ConfiguredNode):
         return self.executive.simulation.plant.time
 
     def has_recorder(self) -> bool:
-        """Whether a recorder reports progress."""
-        return bool(self.count_publishers(self.full_name(topics.PROGRESS.name)))
+        """Whether a recorder reports progress, and its process lives."""
+        return any(not self._presence.is_gone(name) for name in self.publishers_of(topics.PROGRESS.name))
 
     def recorder_listens(self) -> bool:
         """Whether the recorder, whatever its name, has subscribed to every topic of the run."""
@@ -92,6 +94,6 @@ def fly(node: PlantNode) -> None:
     node.log(f"{how}: {figures['tick']} of {figures['ticks']} ticks flown, {figures['misses']} missed")
 
 
-def main() -> int:
+def main() -> None:
     """Run the node."""
-    return run(PlantNode, fly)
+    run(PlantNode, fly)

@@ -3,7 +3,7 @@
 import sys
 from datetime import UTC, datetime
 from functools import partial
-from itertools import pairwise
+from itertools import chain, count, pairwise
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -21,6 +21,7 @@ from formation_gnc.transport.conversion import codec
 from formation_gnc.transport.diagnostics import PERIOD, DiagnosticsPublisher
 from formation_gnc.transport.node import ConfiguredNode
 from formation_gnc.transport.parameter_reader import ParameterReader
+from formation_gnc.transport.presence import announce
 from formation_gnc.transport.process import run, stop_requested
 from formation_gnc.transport.qos import LATEST
 from formation_gnc.transport.raw_topics import Callback, RawTopics
@@ -37,22 +38,26 @@ class RecorderNode(ConfiguredNode):
     """Carries every topic's messages, and the parameters of every node, to a recording session."""
 
     def __init__(self) -> None:
-        """Make the bag; raises ConfigurationError if its directory exists."""
+        """Make the bag; where its directory exists, as of a recorder that died, in the next one that does not."""
         super().__init__("recorder", RecorderParameters)
         values = self.values
-        directory = values.bag or f"bags/{datetime.now(UTC):%Y-%m-%d_%H-%M-%S}"
+        wanted = Path(values.bag or f"bags/{datetime.now(UTC):%Y-%m-%d_%H-%M-%S}")
+        directory = free_directory(wanted)
         files = [Path(file) for flag, file in pairwise(sys.argv) if flag == "--params-file"]
         attachments = {file.name: file.read_bytes() for file in files}
         split = Split(values.split_size or None, values.split_duration or None)
         report = self.publisher_of(Clock, topics.PROGRESS.name, LATEST)
         self.session = RecordingSession(
-            BagWriter(Path(directory), provenance(), attachments, split),
+            BagWriter(directory, provenance(), attachments, split),
             files[0].stem if files else "",
             lambda stamp: report(Clock(stamp)),
             codec(Event).decode,
             values.snapshot,
         )
         self.get_logger().info(f"recording to {directory}")
+        self._presence = announce(self)
+        if directory != wanted:
+            self.warn(topics.PROGRESS.name, f"{wanted} exists already: recording to {directory}")
         self._diagnostics = DiagnosticsPublisher(self, self.full_name("") or "/")
         self.create_wall_timer(PERIOD, self._diagnose)
         self._raw_topics = RawTopics(self, self._open, self.full_name(""))
@@ -87,6 +92,12 @@ class RecorderNode(ConfiguredNode):
         """Stamp (ns) up to which everything is recorded."""
         return max(0, self.session.progress.stamp)
 
+    def destroy_node(self) -> None:
+        """Leave the graph, and show no longer that the process lives."""
+        super().destroy_node()
+        if self._presence is not None:
+            self._presence.close()
+
     def _diagnose(self) -> None:
         failure, lost, stamp = self.session.failure, self.session.lost, self.session.progress.stamp
         level, message = DiagnosticStatus.OK, "recording"
@@ -104,6 +115,12 @@ class RecorderNode(ConfiguredNode):
         return response
 
 
+def free_directory(wanted: Path) -> Path:
+    """A directory that does not exist: the one wanted, or with a number behind its name."""
+    numbered = (wanted.with_name(f"{wanted.name}_{number}") for number in count(2))
+    return next(each for each in chain([wanted], numbered) if not each.exists())
+
+
 def record(node: RecorderNode) -> None:
     """Record until a stop is requested and the queues are drained; raises OSError when the disk fails."""
     session = node.session
@@ -118,6 +135,6 @@ def record(node: RecorderNode) -> None:
         raise session.failure
 
 
-def main() -> int:
+def main() -> None:
     """Run the node."""
-    return run(RecorderNode, record)
+    run(RecorderNode, record)

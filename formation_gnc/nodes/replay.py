@@ -103,6 +103,6 @@ def play(node: ReplayNode) -> None:
     node.spin(lambda: stop_requested() or node.check(), lambda: CHECK_PERIOD)
 
 
-def main() -> int:
+def main() -> None:
     """Run the node."""
-    return run(ReplayNode, play)
+    run(ReplayNode, play)

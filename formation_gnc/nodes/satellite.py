@@ -30,6 +30,6 @@ class Satellite:
             node.destroy_node()
 
 
-def main() -> int:
+def main() -> None:
     """Run the process."""
-    return run(Satellite)
+    run(Satellite)

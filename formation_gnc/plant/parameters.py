@@ -50,6 +50,11 @@ class PlantParameters(CommonParameters):
     forces: Forces = Forces()
     chief_body: Body = Body()
     wait_for_recorder: bool = parameter(False, doc="do not start before a recorder listens to everything")
+    on_recorder_loss: str = parameter(
+        "continue",
+        choices=("continue", "end"),
+        doc="what the run does when its recorder has died, or its disk is full: go on without one, or end",
+    )
     deputies: tuple[str, ...] = parameter(("deputy1",), doc="names of the deputies, each a namespace")
     deputy: dict[str, DeputyParameters] = per_name("deputies")
     faults: tuple[str, ...] = parameter(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import formation_gnc
 from formation_gnc.plugins import plugin_versions
+from formation_gnc.recording.arithmetic import ARITHMETIC, arithmetic
 
 LOST = "lost messages"
 """Name of the metadata record with the number of lost messages by topic."""
@@ -29,15 +30,16 @@ def parameters_record(node: str, start: int | None = None) -> str:
 
 
 def provenance() -> dict[str, dict[str, str]]:
-    """Metadata records of a bag by name: versions of the software, nothing about the machine."""
+    """Metadata records of a bag by name: versions of the software, and what else the last bits depend on."""
     return {
+        ARITHMETIC: arithmetic(),
         "versions": {
             "formation_gnc": formation_gnc.__version__,
             "commit": commit(),
             "python": platform.python_version(),
             **{package: version(package) for package in PACKAGES},
             **plugin_versions(),
-        }
+        },
     }
 
 

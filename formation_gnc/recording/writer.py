@@ -1,5 +1,6 @@
 """Bag writer: MCAP files and metadata.yaml as rosbag2 Jazzy lays them out."""
 
+import errno
 import os
 import time
 from collections.abc import Iterator, Mapping
@@ -250,6 +251,8 @@ class BagWriter:
     def _flush(self) -> None:
         if self._unwritten:
             self._file.mcap.flush()  # type: ignore[no-untyped-call]
+            if os.fstat(self._file.stream.fileno()).st_nlink == 0:
+                raise OSError(errno.ENOENT, "its file has been deleted")
             os.fdatasync(self._file.stream.fileno())
         if self._unlisted:
             self._write_metadata()

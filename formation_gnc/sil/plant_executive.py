@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Any, Protocol
 
+from formation_gnc.errors import RecorderLostError
 from formation_gnc.flight import topics
 from formation_gnc.flight.barrier import Decision
 from formation_gnc.flight.graph import COMMAND, GRAPH
@@ -71,6 +72,7 @@ class PlantExecutive:
         self._answers = [topic.of(deputy) for deputy in deputies for row in GRAPH for topic in row.gives]
         self._commands = {COMMAND.of(deputy): deputy for deputy in deputies}
         self._troubles: dict[str, None] = {}
+        self._recorder_is_missed = False
         self._shared_since: dict[str, float] = {}
 
     @property
@@ -79,12 +81,16 @@ class PlantExecutive:
         return self.simulation.plant.finished
 
     def check(self, now: float) -> bool:
-        """Do what no message triggers; called every `period`. Returns whether all ticks are flown."""
+        """Do what no message triggers; called every `period`. Returns whether all ticks are flown.
+
+        Raises:
+            RecorderLostError: the recorder is gone, and the run is to end then.
+        """
         barrier = self.simulation.barrier
         if not self.simulation.has_begun:
             self._begin_if_all_are_there(now)
         elif not self.finished:
-            barrier.has_recorder = self._around.has_recorder()
+            self._look_for_recorder()
             barrier.check(now)
             self._say_what_is_awaited(barrier.decide(now))
             self.advance_if_ready(now)
@@ -124,6 +130,23 @@ class PlantExecutive:
         barrier = self.simulation.barrier
         barrier.has_recorder = self._around.has_recorder()
         return barrier.recorder_is_done(self.simulation.plant.time)
+
+    def _look_for_recorder(self) -> None:
+        """Go on, or end, as soon as a recorder has died; raises RecorderLostError to end."""
+        barrier = self.simulation.barrier
+        had, barrier.has_recorder = barrier.has_recorder, self._around.has_recorder()
+        if barrier.has_recorder and self._recorder_is_missed:
+            self._recorder_is_missed = False
+            self._publish(topics.EVENTS.name, self.simulation.warning("recorded again", topics.PROGRESS.name))
+        elif had and not barrier.has_recorder:
+            self._recorder_is_missed, barrier.recorded = True, None
+            ends = self._parameters.on_recorder_loss == "end"
+            text = f"the recorder is gone: the run {'ends' if ends else 'goes on unrecorded'} (on_recorder_loss)"
+            self._troubles[text] = None
+            self._publish(topics.EVENTS.name, self.simulation.warning(text, topics.PROGRESS.name))
+            if ends:
+                self._report("ended", self._reported)
+                raise RecorderLostError(f"{text}; {self.simulation.plant.tick} ticks flown")
 
     def _begin_if_all_are_there(self, now: float) -> None:
         missing = ", ".join(self._missing())

@@ -94,9 +94,9 @@ class Simulation:
             detail = f"{plant.tick} ticks flown, {self.misses} missed"
             publish(topics.EVENTS.name, _event(plant.time, plant.tick, EventKind.END, detail))
 
-    def warning(self, detail: str) -> Event:
+    def warning(self, detail: str, subject: str = "") -> Event:
         """An event of the tick in flight that somebody should look at."""
-        return _event(self.plant.time, self.plant.tick, EventKind.WARNING, detail)
+        return _event(self.plant.time, self.plant.tick, EventKind.WARNING, detail, subject)
 
     def figures(self, elapsed: float) -> dict[str, float]:
         """Where the run is, after so many s of wall time since its first tick opened."""

@@ -19,6 +19,7 @@ from formation_gnc.sil.plant_executive import RECORDER
 from formation_gnc.sil.report import Report
 from formation_gnc.sil.scenario import Scenario
 from formation_gnc.transport.diagnostics import subscribe_to_reports
+from formation_gnc.transport.leftovers import folder_prefix, sweep
 from formation_gnc.transport.processes import Graph, NodeDied, NodeProcess
 
 LAST_REPORT = 1.0
@@ -43,14 +44,14 @@ class LaunchOptions:
 
 @contextmanager
 def _noted_interrupts() -> Iterator[Callable[[], None]]:
-    """A function that raises KeyboardInterrupt if SIGINT or SIGTERM has come.
+    """A function that raises KeyboardInterrupt if SIGINT, SIGTERM or SIGHUP has come.
 
     Raised by the handler itself it could strike inside rclpy, which sometimes swallows it.
     """
     noted: list[int] = []
     previous = {
         number: signal.signal(number, lambda number, _: noted.append(number))
-        for number in (signal.SIGINT, signal.SIGTERM)
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     }
 
     def check() -> None:
@@ -108,8 +109,9 @@ def fly_graph(
         last = report
         show(report)
 
+    sweep()
     with (
-        tempfile.TemporaryDirectory(prefix="formation_gnc-") as directory,
+        tempfile.TemporaryDirectory(prefix=folder_prefix()) as directory,
         domain_coordinator.domain_id() as domain,
         _noted_interrupts() as raise_if_interrupted,
     ):

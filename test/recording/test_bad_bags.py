@@ -212,7 +212,7 @@ def test_a_message_that_does_not_fit_is_named_with_its_place_the_rest_used(
     assert "10 s" in output
 
 
-def test_recover_verify_finds_a_message_that_does_not_fit_and_writes_nothing(whole: Path, tmp_path: Path) -> None:
+def test_verify_finds_a_message_that_does_not_fit_and_writes_nothing(whole: Path, tmp_path: Path) -> None:
     bag = with_misfit(whole, tmp_path / "misfit", "/deputy1/thrust")
     before = sorted(tmp_path.rglob("*"))
     assert main(["recover", "--verify", str(bag)]) == 3

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from formation_gnc.errors import RecorderLostError
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import COMMAND, GRAPH
 from formation_gnc.records import EventKind, Thrust
@@ -165,6 +166,31 @@ def test_a_recorder_that_lags_holds_the_plant_and_is_named(complete: Graph) -> N
     assert executive.simulation.misses == 0
     executive.recorded(RECORDER_LAG * 10**9, 3.0)
     assert executive.simulation.plant.tick == RECORDER_LAG + 2
+
+
+@pytest.mark.parametrize("choice", ["continue", "end"])
+def test_a_recorder_that_dies_does_not_hold_the_plant(complete: Graph, choice: str) -> None:
+    complete.recorder = True
+    executive = start(complete, ticks=2 * RECORDER_LAG, on_recorder_loss=choice)
+    executive.recorded(0, 0.0)
+    executive.check(0.0)
+    for _ in range(2 * RECORDER_LAG):
+        answer(executive, 0.0)
+    assert executive.simulation.plant.tick == RECORDER_LAG + 1, "it waits while it lives"
+    complete.recorder = False
+    if choice == "end":
+        with pytest.raises(RecorderLostError, match=r"the recorder is gone: the run ends"):
+            executive.check(0.1)
+    else:
+        executive.check(0.1)
+        answer(executive, 0.1)
+        assert executive.simulation.plant.tick > RECORDER_LAG + 1
+        complete.recorder = True
+        executive.check(0.2)
+        assert complete.events(EventKind.WARNING)[-1].detail == "recorded again"
+    assert "the recorder is gone" in complete.events(EventKind.WARNING)[0].detail
+    executive._report("", 1.0)
+    assert any("the recorder is gone" in text for text in complete.reports[-1].troubles)
 
 
 def test_the_plant_stays_until_the_recorder_has_its_end(complete: Graph) -> None:
