@@ -12,6 +12,10 @@ LONGEST_CHECK_GAP = 0.5
 """Wall time (s) between two checks beyond which the barrier itself has been held up."""
 
 
+LONGEST_START = 300.0
+"""Wall time (s) beyond the deadline that a first answer is awaited: kernels may have to be compiled."""
+
+
 @dataclass(frozen=True)
 class Decision:
     """Decision on the tick in flight.
@@ -37,7 +41,7 @@ class TickBarrier:
 
     A tick is over when every deputy has answered it or missed it, the recorder is within its allowed lag, and
     the pace allows it. A deputy that has answered once misses a tick when it has not answered `deadline` s
-    after the tick opened; its first answer is awaited without limit, since nodes take time to start.
+    after the tick opened; its first answer is awaited LONGEST_START longer, since nodes take time to start.
 
     deputies: who answers. deadline: s of wall time, infinite for none. allowed_lag: ns that the recorder may be behind.
     period: wall time (s) of a tick at the real-time factor; 0 for as fast as possible.
@@ -99,6 +103,8 @@ class TickBarrier:
         self._checked = now
         if self._is_overdue(now):
             self._awaited -= self._known
+            if now - self._opened > self.deadline + LONGEST_START:
+                self._awaited.clear()
 
     def decide(self, now: float) -> Decision:
         """Whether the tick is over, and if not, what it waits for."""

@@ -1,8 +1,9 @@
 """The node of a flight module, whichever: its place in the graph is read from the graph table."""
 
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
+from threading import BoundedSemaphore
 from time import perf_counter, time_ns
 from typing import Any
 
@@ -16,7 +17,7 @@ from formation_gnc.parameters import dump
 from formation_gnc.records import WARNINGS, EventKind, Timing
 from formation_gnc.transport.bus import IntraProcessBus
 from formation_gnc.transport.diagnostics import PERIOD, DiagnosticsPublisher
-from formation_gnc.transport.node import ConfiguredNode
+from formation_gnc.transport.node import ConfiguredNode, rejected
 from formation_gnc.types import NANOSECONDS
 
 SETTLING = 0.1
@@ -24,6 +25,9 @@ SETTLING = 0.1
 
 SOON = 1_000_000
 """The same (ns) for a node that has been busy: what has come meanwhile is received within this time."""
+
+DESIGNS = 8
+"""Requests to change parameters that may wait for their designs; more are rejected."""
 
 LATE = 50_000_000
 """Wall time (ns) after which a message that is received counts as one of several that wait."""
@@ -64,9 +68,10 @@ class ModuleNode(ConfiguredNode):
         self._diagnostics = DiagnosticsPublisher(self, self.full_name(f"/{self._instance.deputy}"))
         self.create_wall_timer(PERIOD, self._diagnose)
         self._designer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="design")
+        free = BoundedSemaphore(DESIGNS)
         for service in self.services:
             if service.srv_name.endswith(("/set_parameters", "/set_parameters_atomically")):
-                _answer_from(self._designer, service)
+                _answer_from(self._designer, service, free)
 
     def _published(self, topic: topics.Topic) -> Callable[[Any], None]:
         name = topic.of(self._instance.deputy)
@@ -167,8 +172,21 @@ class ModuleNode(ConfiguredNode):
         super().destroy_node()
 
 
-def _answer_from(pool: ThreadPoolExecutor, service: Service) -> None:
-    """Let a thread of `pool` work out a service's responses and send each when it is there."""
+def _answer_from(pool: ThreadPoolExecutor, service: Service, free: BoundedSemaphore) -> None:
+    """Let a thread of `pool` work out a service's responses and send each when it is there; reject those too many."""
     handle, send = service.callback, service.send_response
-    service.callback = lambda request, response: pool.submit(handle, request, response)
-    service.send_response = lambda answer, header: answer.add_done_callback(lambda done: send(done.result(), header))
+
+    def answer(request: Any, response: Any) -> Any:
+        if not free.acquire(blocking=False):
+            return rejected(request, response, f"{DESIGNS} changes wait for their designs already; try again later")
+        designed = pool.submit(handle, request, response)
+        designed.add_done_callback(lambda _: free.release())
+        return designed
+
+    def send_when_done(answer: Any, header: Any) -> None:
+        if isinstance(answer, Future):
+            answer.add_done_callback(lambda done: send(done.result(), header))
+        else:
+            send(answer, header)
+
+    service.callback, service.send_response = answer, send_when_done

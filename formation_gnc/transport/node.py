@@ -273,15 +273,20 @@ def _rejecting_malformed[S](handle: Callable[[Any, S], S]) -> Callable[[Any, S],
             for each in request.parameters:
                 Parameter.from_parameter_msg(each)
         except ValueError as error:
-            rejection = SetParametersResult(successful=False, reason=f"malformed request: {error}")
-            if isinstance(request, SetParameters.Request):
-                response.results = [rejection] * len(request.parameters)
-            else:
-                response.result = rejection
-            return response
+            return rejected(request, response, f"malformed request: {error}")
         return handle(request, response)
 
     return answer
+
+
+def rejected(request: Any, response: Any, reason: str) -> Any:
+    """Response to a request to set parameters that rejects all of it."""
+    rejection = SetParametersResult(successful=False, reason=reason)
+    if isinstance(request, SetParameters.Request):
+        response.results = [rejection] * len(request.parameters)
+    else:
+        response.result = rejection
+    return response
 
 
 def serve(*nodes: ConfiguredNode) -> None:

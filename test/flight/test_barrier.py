@@ -6,7 +6,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from formation_gnc.flight.barrier import ADVANCE, LONGEST_CHECK_GAP, TickBarrier
+from formation_gnc.flight.barrier import ADVANCE, LONGEST_CHECK_GAP, LONGEST_START, TickBarrier
 
 TICK = 1_000_000_000
 DEADLINE = 2.0
@@ -42,11 +42,11 @@ def test_an_answer_counts_once_and_only_to_the_tick_in_flight() -> None:
     assert not lock.answer("deputy1", 0, FORCE), "of a tick that is over"
 
 
-def test_a_first_answer_is_awaited_without_limit() -> None:
+def test_a_first_answer_is_awaited_long_beyond_the_deadline() -> None:
     lock = barrier()
-    for second in range(1000):
+    for second in range(700):
         lock.check(0.4 * second)
-    decision = lock.decide(400.0)
+    decision = lock.decide(280.0)
     assert decision.waiting_for == ("deputy1",)
     assert decision.overdue, "which is worth a word"
 
@@ -66,6 +66,16 @@ def test_a_later_answer_is_missed_at_the_deadline() -> None:
     assert lock.reason_of_miss("deputy1", ["/deputy1/estimate"]) == (
         "did not answer within 2 s (nobody publishes /deputy1/estimate)"
     )
+
+
+def test_even_a_first_answer_is_not_awaited_for_ever() -> None:
+    lock = barrier()
+    for now in np.arange(0.0, DEADLINE + LONGEST_START, 0.5):
+        lock.check(float(now))
+    assert not lock.decide(DEADLINE + LONGEST_START).advance
+    for now in (DEADLINE + LONGEST_START, DEADLINE + LONGEST_START + 0.1):
+        lock.check(now)
+    assert lock.decide(DEADLINE + LONGEST_START + 0.1) == ADVANCE
 
 
 def test_time_in_which_the_plant_was_held_up_is_not_held_against_deputies() -> None:
