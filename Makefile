@@ -9,7 +9,7 @@ in_environment := source ./env.sh &&
 pytest := python -m pytest --disable-plugin-autoload -p randomly -p timeout -p hypothesispytest --timeout 300
 shared := -p xdist -n auto --dist worksteal
 
-.PHONY: help setup demo test test-fast check bench verify lock clean force
+.PHONY: help setup demo test test-fast check bench verify fuzz lock clean force
 
 help:
 	@echo "make demo        fly the default scenario on the node graph, and record it"
@@ -18,6 +18,7 @@ help:
 	@echo "make check       lint and types"
 	@echo "make bench       measure speed, into build/bench.json"
 	@echo "make verify      long runs against independent programs, into docs/verification/"
+	@echo "make fuzz        hostile bytes and texts through all readers, a million of them"
 	@echo "make setup       the environment alone; then: source env.sh"
 	@echo "make lock        pin the newest versions that requirements*.in allow (takes uv)"
 	@echo "make clean       remove what was built; .venv and bags/ stay"
@@ -42,6 +43,9 @@ bench: .venv/.verify
 verify: .venv/.verify
 	@$(in_environment) $(pytest) --timeout 0 -m slow && \
 		$(pytest) $(shared) --timeout 0 --hypothesis-profile search -m "not sil and not slow" && python -m verification
+
+fuzz: setup
+	@$(in_environment) python -m tools.fuzz
 
 # Which ROS, and for which place: a change of either is a new environment.
 .ros: force

@@ -32,7 +32,8 @@ def bounded(bound: Bound, **metadata: Any) -> dict[str, Any]:
 def finite_state(value: Vector | Matrix) -> str:
     """States or lists of them, of any shape."""
     flat = value.ravel()
-    return "" if flat.dot(flat) < LARGEST**2 else f"finite and below {LARGEST:g}"  # false for NaN
+    with np.errstate(over="ignore"):
+        return "" if flat.dot(flat) < LARGEST**2 else f"finite and below {LARGEST:g}"  # false for NaN
 
 
 def orbit(state: Vector) -> str:
