@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from formation_gnc import records
+from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import GRAPH, Input, ModuleInstance, Row
 from formation_gnc.recording.provenance import provenance
@@ -115,7 +116,10 @@ def test_a_module_stands_any_message_and_answers_the_next_tick(
         take(topic, from_cdr(kind, to_cdr(flown[topic][0])))
     name = hostile.topic.of("deputy1" if hostile in row.takes else "deputy2")
     for _ in range(2):
-        bad = received(hostile.record)(data.draw(messages(hostile)))
+        try:
+            bad = received(hostile.record)(data.draw(messages(hostile)))
+        except ConfigurationError:  # does not reach a module
+            continue
         bad.time = data.draw(st.sampled_from([bad.time, 10**9]))
         for topic, kind in everything.items():
             record = (
