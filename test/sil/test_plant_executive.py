@@ -215,7 +215,7 @@ def test_the_pace_decides_when_the_next_check_is(complete: Graph) -> None:
     assert executive.simulation.plant.tick == 1
 
 
-@pytest.mark.parametrize("topic", ["/clock", "/truth", "/deputy1/measurement", *EVERYBODY])
+@pytest.mark.parametrize("topic", ["/clock", "/truth", "/deputy1/measurement", *sorted(EVERYBODY)])
 @pytest.mark.parametrize("other", ["/rosbag2_player", ""], ids=["another", "of the same name"])
 def test_the_run_does_not_start_while_another_publishes_its_topics(complete: Graph, topic: str, other: str) -> None:
     (own,) = complete.publishers_of(topic)
@@ -229,7 +229,7 @@ def test_the_run_does_not_start_while_another_publishes_its_topics(complete: Gra
     assert complete.said[-1] == "flying"
 
 
-@pytest.mark.parametrize("topic", ["/clock", "/truth", "/deputy1/measurement", "/recorder/progress", *EVERYBODY])
+@pytest.mark.parametrize("topic", ["/clock", "/truth", "/deputy1/measurement", "/recorder/progress", *sorted(EVERYBODY)])
 def test_another_publisher_in_flight_is_named_once_and_withstood(complete: Graph, topic: str) -> None:
     executive = start(complete, ticks=3)
     complete.others = {topic: ["/other"]}
