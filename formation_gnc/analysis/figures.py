@@ -72,12 +72,13 @@ def figures(bag: Bag) -> RunFigures:
         BagError: as for `trajectories`.
     """
     events = bag.arrays(topics.EVENTS.name, ("kind", "node")) if has_messages(bag, topics.EVENTS.name) else None
-    deputies = {name: _deputy_figures(name, path, events) for name, path in trajectories(bag).items()}
+    deputies = {name: deputy_figures(name, path, events) for name, path in trajectories(bag).items()}
     misses = 0 if events is None else event_kinds(events).count(kind_name(EventKind.MISS))
     return RunFigures(bag.topics[topics.TRUTH.name].count, misses, deputies)
 
 
-def _deputy_figures(name: str, path: Trajectory, events: Fields | None) -> DeputyFigures:
+def deputy_figures(name: str, path: Trajectory, events: Fields | None) -> DeputyFigures:
+    """Figures of one deputy from its trajectory and the events of the run, with kind, node and time; None without."""
     error = np.linalg.norm(path.error, axis=1)
     estimation = np.linalg.norm(path.estimation_error[:, :3], axis=1)
     measured = path.nis[path.nis > 0.0]

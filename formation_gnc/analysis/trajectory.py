@@ -132,13 +132,20 @@ def trajectories(bag: Bag) -> dict[str, Trajectory]:
         missing = [topic.name for topic in (topics.ESTIMATE, topics.TARGET) if topic.of(name) not in bag.topics]
         if missing:
             raise BagError(f"{bag.path}: has no {' and no '.join(missing)} of {name}")
-        own = {topic.of(name): selection for topic, selection in _OF_DEPUTY.items()}
+        own = {topic.of(name): selection for topic, selection in OF_DEPUTY.items()}
         selections |= {topic: selection for topic, selection in own.items() if has_messages(bag, topic)}
     columns = _columns(bag, selections)
     stamps, chief, *states = columns[topics.TRUTH.name]
-    period = _period(chief[0])
+    period = period_of(chief[0])
     return {
-        name: _trajectory(bag, name, columns, (stamps, *states[3 * index : 3 * index + 3]), period)
+        name: assemble(
+            f"{bag.path}: {name}",
+            {topic: columns[topic.of(name)] for topic in OF_DEPUTY if topic.of(name) in columns},
+            (stamps, *states[3 * index : 3 * index + 3]),
+            unseen_thrust(bag, name),
+            bag.tick_ns * 1e-9,
+            period,
+        )
         for index, name in enumerate(names)
     }
 
@@ -174,7 +181,7 @@ def _estimated_columns(estimates: Fields) -> Columns:
     return estimates["stamp_ns"], estimates["relative_state"], np.sqrt(variance), estimates["nis"], used
 
 
-_OF_DEPUTY: dict[Any, Selection] = {
+OF_DEPUTY: dict[Any, Selection] = {
     topics.ESTIMATE: (("relative_state", "covariance", "nis", "innovations"), _estimated_columns),
     topics.TARGET: (("relative_state",), lambda target: (target["stamp_ns"], target["relative_state"])),
     topics.THRUST: (("force",), lambda thrust: (thrust["time"], np.abs(thrust["force"]).sum(axis=1))),
@@ -192,25 +199,37 @@ _OF_DEPUTY: dict[Any, Selection] = {
 _NO_COLUMNS: Columns = (np.zeros(0),) * 5
 
 
-def _trajectory(bag: Bag, deputy: str, columns: Mapping[str, Columns], truth: Columns, period: float) -> Trajectory:
-    """Trajectory of one deputy, of the stamps, relative states, forces and masses of its truth."""
+def assemble(
+    source: str, columns: Mapping[Any, Columns], truth: Columns, unseen: UnseenThrust, tick: float, period: float
+) -> Trajectory:
+    """Trajectory of one deputy.
+
+    Args:
+        source: where it is from, for errors.
+        columns: by topic of `OF_DEPUTY`, as selected there.
+        truth: stamps, relative states, forces and masses.
+        unseen: thrust over the ticks that truth lacks.
+        tick: s.
+        period: of the chief's orbit, s.
+
+    Raises:
+        BagError: no tick with an estimate and a target.
+    """
     true_stamps, states, forces, masses = truth
-    estimate_stamps, estimates, sigma, nis, innovations = columns.get(topics.ESTIMATE.of(deputy), _NO_COLUMNS)
-    target_stamps, targets, *_ = columns.get(topics.TARGET.of(deputy), _NO_COLUMNS)
+    estimate_stamps, estimates, sigma, nis, innovations = columns.get(topics.ESTIMATE, _NO_COLUMNS)
+    target_stamps, targets, *_ = columns.get(topics.TARGET, _NO_COLUMNS)
     stamps = np.intersect1d(np.intersect1d(true_stamps, estimate_stamps), target_stamps)
     if not len(stamps):
-        raise BagError(f"{bag.path}: no tick with an estimate and a target of {deputy}")
+        raise BagError(f"{source}: no tick with an estimate and a target")
     true_rows, rows, target_rows = (
         np.searchsorted(each, stamps) for each in (true_stamps, estimate_stamps, target_stamps)
     )
-    tick = bag.tick_ns * 1e-9
-    unseen = unseen_thrust(bag, deputy)
     ends = np.concatenate((true_stamps[1:], unseen.stamps))
     order = np.argsort(ends, kind="stable")
     applied = (forces / masses[:, None])[1:]  # truth holds the force of the tick before
-    commanded_time, commanded, *_ = columns.get(topics.THRUST.of(deputy), _NO_COLUMNS)
+    commanded_time, commanded, *_ = columns.get(topics.THRUST, _NO_COLUMNS)
     commanded = commanded / np.interp(commanded_time, true_stamps * 1e-9, masses)
-    saturated, fallbacks, laws, *_ = columns.get(topics.STATUS.of(deputy), _NO_COLUMNS)
+    saturated, fallbacks, laws, *_ = columns.get(topics.STATUS, _NO_COLUMNS)
     return Trajectory(
         time=stamps * 1e-9,
         truth=states[true_rows],
@@ -240,7 +259,7 @@ def _used_innovations(estimates: Fields) -> Vector:
     return used
 
 
-def _period(chief: Vector) -> float:
+def period_of(chief: Vector) -> float:
     """Period (s) of the two-body orbit through an inertial state."""
     radius, speed = float(np.linalg.norm(chief[:3])), float(np.linalg.norm(chief[3:]))
     axis = 1.0 / (2.0 / radius - speed**2 / MU)

@@ -26,12 +26,23 @@ def overrides_of(entries: Iterable[str]) -> dict[str, dict[str, Any]]:
     overrides: dict[str, dict[str, Any]] = {}
     for entry in entries:
         target, equals, text = entry.partition("=")
-        node, dot, name = target.strip().partition(".")
-        if not (equals and dot and node and name):
+        if not equals:
             raise ConfigurationError(f"set {entry!r}: is not allowed; it must be like {FORM}")
-        pattern = "/**" if node == "plant" and name in SHARED else _pattern(node, entry)
+        pattern, name = address_of(target.strip(), f"set {entry!r}")
         overrides.setdefault(pattern, {})[name] = parse_value(name, text)
     return dict(sorted(overrides.items(), key=lambda item: "*" not in item[0]))
+
+
+def address_of(target: str, source: str) -> tuple[str, str]:
+    """Node pattern and dotted name of a parameter given as `NODE.PARAMETER`, with NODE as for `overrides_of`.
+
+    Raises:
+        ConfigurationError: another form or an unknown node; it names the source.
+    """
+    node, dot, name = target.partition(".")
+    if not (dot and node and name):
+        raise ConfigurationError(f"{source}: is not allowed; it must be like {FORM}")
+    return "/**" if node == "plant" and name in SHARED else _pattern(node, source), name
 
 
 def parse_value(name: str, text: str) -> Any:
@@ -45,14 +56,14 @@ def parse_value(name: str, text: str) -> Any:
     return value
 
 
-def _pattern(node: str, entry: str) -> str:
+def _pattern(node: str, source: str) -> str:
     """Pattern of a parameter file for a node as given."""
     if node.startswith("/"):
         return node
     deputy, slash, module = node.rpartition("/")
     known = MODULES if slash else ("plant", *MODULES)
     if module not in known:
-        raise ConfigurationError(f"set {entry!r}: node {node} is unknown; {nearest(module, known)}")
+        raise ConfigurationError(f"{source}: node {node} is unknown; {nearest(module, known)}")
     if module == "plant":
         return "/plant"
     return f"/{deputy}/{module}" if slash else f"/**/{module}"
