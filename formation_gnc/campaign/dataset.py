@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from pyarrow.dataset import dataset, field
 
 from formation_gnc.campaign.case import CASE, VARIANT
 from formation_gnc.campaign.definition import Campaign, load_campaign
@@ -97,36 +98,51 @@ class Dataset:
         """Write a part; that of `cases/` last, since it says that the part is done."""
         name = part_name(cases)
         for folder, values in ((TIMING, wall), (ERRORS, curves), (CASES, rows)):
+            if not values:
+                continue
             table = _table(values)
             _replace(self.directory / folder / name, lambda path, table=table: pq.write_table(table, path))
 
-    def column(self, names: Sequence[str], folder: str = CASES, runs: int | None = None) -> pa.Table:
-        """Columns of all parts, sorted by case and configuration; one that a part lacks is null there."""
-        wanted = [CASE, VARIANT, *names]
-        parts = []
-        for first, end in self.done():
-            if runs is not None and first >= runs:
-                continue
-            file = pq.ParquetFile(self.directory / folder / part_name((first, end)))
-            there = [name for name in wanted if name in file.schema_arrow.names]
-            parts.append(file.read(columns=there))
-        if not parts:
-            return pa.table({name: [] for name in wanted})
-        table = pa.concat_tables(parts, promote_options="permissive")
+    def table(self, names: Sequence[str], folder: str = CASES, runs: int | None = None, flights: Any = None) -> pa.Table:
+        """Columns of all parts with case and configuration, sorted by them; what a part lacks is null.
+
+        Args:
+            names: of the columns.
+            folder: which data set.
+            runs: cases from this one on are left out.
+            flights: name of a configuration; all others are left out.
+        """
+        files = self._files(folder, runs)
+        wanted = list(dict.fromkeys([CASE, VARIANT, *names]))
+        if not files:
+            return pa.table({name: pa.nulls(0) for name in wanted})
+        schema = pa.unify_schemas([pq.read_schema(path) for path in files], promote_options="permissive")
+        chosen = field(CASE) >= 0
+        if runs is not None:
+            chosen = chosen & (field(CASE) < runs)
+        if flights is not None:
+            chosen = chosen & (field(VARIANT) == flights)
+        there = [name for name in wanted if name in schema.names]
+        table = dataset(files, schema=schema, format="parquet").to_table(columns=there, filter=chosen)
         for name in wanted:
             if name not in table.column_names:
                 table = table.append_column(name, pa.nulls(len(table), pa.float64()))
-        if runs is not None:
-            table = table.filter(pa.compute.less(table[CASE], runs))
         return table.sort_by([(CASE, "ascending"), (VARIANT, "ascending")])
 
     def names(self) -> list[str]:
         """Names of the columns of `cases/`, of all parts together."""
         known: dict[str, None] = {}
-        for cases in self.done():
-            schema = pq.read_schema(self.directory / CASES / part_name(cases))
-            known |= dict.fromkeys(schema.names)
+        for path in self._files(CASES, None):
+            known |= dict.fromkeys(pq.read_schema(path).names)
         return list(known)
+
+    def _files(self, folder: str, runs: int | None) -> list[Path]:
+        paths = (
+            self.directory / folder / part_name((first, end))
+            for first, end in self.done()
+            if runs is None or first < runs
+        )
+        return [path for path in paths if path.exists()]
 
 
 def curve_rows(row: Mapping[str, Any], curves: Mapping[str, Matrix]) -> Iterator[dict[str, Any]]:

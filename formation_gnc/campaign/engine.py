@@ -142,7 +142,7 @@ def _fly(
 
     ranges: dict[str, Range] = {}
     show(done)
-    pending = as_completed([submit(each) for each in islice(missing, most())])
+    pending = as_completed([submit(each) for each in islice(missing, most())], loop=client.loop)
     for future in pending:
         cases = ranges.pop(future.key)
         for again in _finish(future, cases, directory, own):

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from formation_gnc.campaign.case import CASE, REASON, VARIANT
+from formation_gnc.campaign.case import CASE, REASON
 from formation_gnc.campaign.dataset import Dataset
 from formation_gnc.campaign.definition import Campaign
 from formation_gnc.campaign.flight_figures import BANDS, OF_RUN, band
@@ -73,11 +73,9 @@ class Flights:
 
     def column(self, name: str, configuration: str) -> Values:
         """A column of one configuration; NaN where it has no value."""
-        table = self.results.column([name, REASON], runs=self.campaign.runs)
-        own = np.array(table[VARIANT].to_pylist(), dtype=object) == configuration
-        values = np.array([nan if each is None else float(each) for each in table[name].to_pylist()], dtype=float)[own]
-        reasons = np.array(table[REASON].to_pylist(), dtype=object)[own]
-        return Values(np.array(table[CASE].to_pylist(), dtype=np.int64)[own], values, reasons)
+        table = self.results.table([name, REASON], runs=self.campaign.runs, flights=configuration)
+        values = np.array([nan if each is None else float(each) for each in table[name].to_pylist()], dtype=float)
+        return Values(table[CASE].to_numpy(), values, np.array(table[REASON].to_pylist(), dtype=object))
 
     def figure(self, name: str, configuration: str, upper: bool = True) -> Values:
         """A figure; of several deputies that of the one which is worst off.
@@ -183,10 +181,10 @@ class Flights:
         names = [each.name for each in self.campaign.dispersions] + [f"faults.{each.name}" for each in self.campaign.faults]
         for name in names:
             columns = [column for column in self.names if _is_of(column, name)]
-            table = self.results.column(columns, runs=self.campaign.runs)
-            own = np.array(table[VARIANT].to_pylist(), dtype=object) == self.campaign.configurations[0].name
-            if own.sum() > 1 and all(len(_distinct(table[column], own)) < 2 for column in columns):
-                raise NotAppliedError(f"dispersion {name}: has the same value in all {own.sum()} flights: it was not applied")
+            first = self.campaign.configurations[0].name
+            table = self.results.table(columns, runs=self.campaign.runs, flights=first)
+            if len(table) > 1 and all(len(set(table[column].to_pylist())) < 2 for column in columns):
+                raise NotAppliedError(f"dispersion {name}: has the same value in all {len(table)} flights: it was not applied")
 
 
 _RELATIONS: dict[str, Any] = {"<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal}
@@ -194,10 +192,6 @@ _RELATIONS: dict[str, Any] = {"<": np.less, "<=": np.less_equal, ">": np.greater
 
 def _is_of(column: str, name: str) -> bool:
     return column == name or (column.startswith(name) and column[len(name)] in "[.")
-
-
-def _distinct(column: Any, own: Any) -> set[Any]:
-    return {each for each, mine in zip(column.to_pylist(), own, strict=True) if mine}
 
 
 @dataclass(frozen=True)
