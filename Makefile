@@ -61,7 +61,7 @@ fuzz: setup
 
 # Python files are linked, not copied, so that a change to one needs no build; messages, data files and entry points do.
 install/.ready: .venv/.ready tools/build.sh package.xml setup.py setup.cfg msg_defs/package.xml msg_defs/CMakeLists.txt \
-		$(wildcard msg_defs/msg msg_defs/msg/*.msg params params/* launch launch/* scripts/*)
+		$(wildcard msg_defs/msg msg_defs/msg/*.msg params params/* campaigns campaigns/* launch launch/* scripts/*)
 	@tools/build.sh
 	@touch $@
 

@@ -21,6 +21,7 @@ setup(
         (f"share/{NAME}", ["package.xml"]),
         ("bin", ["scripts/formation-gnc"]),  # colcon puts bin on PATH, and leaves the nodes off it
         (f"share/{NAME}/params", files("params", "*.yaml")),
+        (f"share/{NAME}/campaigns", files("campaigns", "*.yaml")),
         (f"share/{NAME}/launch", files("launch", "*.py")),
     ],
     install_requires=["setuptools"],

@@ -50,14 +50,15 @@ def draw_panels(run: RunHistory, directory: Path) -> list[Path]:
     pictures = {f"fleet_{panel.name}": panel.plots(run) for panel in FLEET_PANELS}
     for deputy in run.deputies.values():
         pictures |= {f"{deputy.name}_{panel.name}": panel.plots(deputy) for panel in DEPUTY_PANELS}
-    return [_draw_column(plots, directory / f"{name}.png") for name, plots in pictures.items() if plots]
+    return [draw_column(plots, directory / f"{name}.png") for name, plots in pictures.items() if plots]
 
 
 def _overview_plots[H](history: H, panels: Sequence[Panel[H]]) -> list[Plot]:
     return [plot for panel in panels if panel.in_overview for plot in panel.plots(history)]
 
 
-def _draw_column(plots: Sequence[Plot], path: Path) -> Path:
+def draw_column(plots: Sequence[Plot], path: Path) -> Path:
+    """Draw plots below one another as a picture; returns its path."""
     figure = _figure(6.0, 4.5 * len(plots), 150)
     grid = figure.add_gridspec(len(plots), 1)
     for row, plot in enumerate(plots):

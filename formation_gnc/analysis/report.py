@@ -1,6 +1,6 @@
 """A recorded run as one self-contained HTML page, of bounded size whatever the length of the bag."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -9,6 +9,7 @@ import plotly.graph_objects as go
 
 from formation_gnc.analysis.figure_table import FIGURES
 from formation_gnc.analysis.figures import figures
+from formation_gnc.analysis.page import section, table, write_page
 from formation_gnc.analysis.panels.panel import Panel
 from formation_gnc.analysis.panels.registry import DEPUTY_PANELS, FLEET_PANELS
 from formation_gnc.analysis.plot import Plot
@@ -18,13 +19,6 @@ from formation_gnc.analysis.timeline import Timeline
 from formation_gnc.flight import topics
 from formation_gnc.recording.reader import Bag
 from formation_gnc.types import NANOSECONDS
-
-_STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; margin: 1.5rem auto; max-width: 1280px; padding: 0 1rem; }
-table { border-collapse: collapse; font-size: 13px; display: block; overflow-x: auto }
-td, th { border: 1px solid #ddd; padding: 2px 8px }
-th { text-align: left; background: #f5f5f5 } details { margin: .4rem 0 } summary { cursor: pointer }
-"""
 
 
 def write_report(bag: Bag, run: RunHistory, path: Path, title: str) -> Path:
@@ -43,22 +37,14 @@ def write_report(bag: Bag, run: RunHistory, path: Path, title: str) -> Path:
     for name, deputy in run.deputies.items():
         own = _figures(deputy, DEPUTY_PANELS, run.timeline_of(name))
         charts |= {f"{name}: {heading}": figure for heading, figure in own.items()}
-    sections = [f"<h2>Summary</h2>{_table(_summary(run, bag))}<h2>Figures</h2>{_figure_table(bag)}"]
-    sections += [_section(heading, figure, number == 0) for number, (heading, figure) in enumerate(charts.items())]
+    sections = [f"<h2>Summary</h2>{table(_summary(run, bag))}<h2>Figures</h2>{_figure_table(bag)}"]
+    sections += [section(heading, figure, number == 0) for number, (heading, figure) in enumerate(charts.items())]
     sections += [_event_table(run), "<h2>Parameters and provenance</h2>"]
     sections += [
-        f"<details><summary>{escape(name)}</summary>{_table(values)}</details>"
+        f"<details><summary>{escape(name)}</summary>{table(values)}</details>"
         for name, values in sorted(bag.metadata.items())
     ]
-    page = (
-        f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{escape(title)}</title>"
-        f"<link rel='icon' href='data:,'><style>{_STYLE}</style></head><body><h1>{escape(title)}</h1>"
-        f"{''.join(sections)}</body></html>"
-    )
-    path.write_text(page, encoding="utf-8")
-    return path
+    return write_page(path, title, sections)
 
 
 def _figures[H](history: H, panels: Sequence[Panel[H]], timeline: Timeline) -> dict[str, go.Figure]:
@@ -114,14 +100,3 @@ def _event_table(run: RunHistory) -> str:
     rest = f"<p>and {more} more</p>" if more else ""
     head = "<tr><th>time [s]</th><th>kind</th><th>subject</th><th>node</th><th>detail</th></tr>"
     return f"<h2>Events</h2><table>{head}{rows}</table>{rest}"
-
-
-def _section(heading: str, figure: go.Figure, with_library: bool) -> str:
-    config = {"displaylogo": False, "responsive": True}
-    body = figure.to_html(full_html=False, include_plotlyjs=with_library, auto_play=False, config=config)
-    return f"<h2>{escape(heading)}</h2>{body}"
-
-
-def _table(values: Mapping[str, Any]) -> str:
-    rows = "".join(f"<tr><th>{escape(str(k))}</th><td>{escape(str(v))}</td></tr>" for k, v in values.items())
-    return f"<table>{rows}</table>"

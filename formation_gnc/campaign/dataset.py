@@ -94,7 +94,9 @@ class Dataset:
                 at = until
             at = max(at, end)
 
-    def write(self, cases: Range, rows: Sequence[Mapping[str, Any]], curves: Sequence[Mapping[str, Any]], wall: Any) -> None:
+    def write(
+        self, cases: Range, rows: Sequence[Mapping[str, Any]], curves: Sequence[Mapping[str, Any]], wall: Any
+    ) -> None:
         """Write a part; that of `cases/` last, since it says that the part is done."""
         name = part_name(cases)
         for folder, values in ((TIMING, wall), (ERRORS, curves), (CASES, rows)):
@@ -103,7 +105,9 @@ class Dataset:
             table = _table(values)
             _replace(self.directory / folder / name, lambda path, table=table: pq.write_table(table, path))
 
-    def table(self, names: Sequence[str], folder: str = CASES, runs: int | None = None, flights: Any = None) -> pa.Table:
+    def table(
+        self, names: Sequence[str], folder: str = CASES, runs: int | None = None, flights: Any = None
+    ) -> pa.Table:
         """Columns of all parts with case and configuration, sorted by them; what a part lacks is null.
 
         Args:

@@ -141,7 +141,9 @@ def _campaign(path: Path, text: str, document: Any, runs: int | None, scenario: 
             raise ConfigurationError(f"{key}: unknown; {nearest(str(key), KEYS)}")
     for key in ("dispersions", "faults", "set", "variants", "sweep"):
         if not isinstance(document.get(key, {}), dict):
-            raise ConfigurationError(f"{key}: {document[key]!r} is not allowed; it must map names to what they are given")
+            raise ConfigurationError(
+                f"{key}: {document[key]!r} is not allowed; it must map names to what they are given"
+            )
     if scenario is None:
         name = document["scenario"]
         scenario = find_scenario(str(path.parent / name) if name.endswith((".yaml", ".yml")) else name)
@@ -155,9 +157,7 @@ def _campaign(path: Path, text: str, document: Any, runs: int | None, scenario: 
         raise ConfigurationError(f"requirements: {statements!r} is not allowed; it must be a list of statements")
     requirements = tuple(requirement_of(each, deputies) for each in statements)
     runs = _whole("runs", document.get("runs", 852) if runs is None else runs, 1)
-    return Campaign(
-        path.stem, text, scenario.absolute(), seed, runs, configurations, dispersions, faults, requirements
-    )
+    return Campaign(path.stem, text, scenario.absolute(), seed, runs, configurations, dispersions, faults, requirements)
 
 
 def _whole(name: str, value: Any, least: int) -> int:
@@ -175,7 +175,9 @@ def _configurations(document: Mapping[str, Any], seed: int) -> Iterator[Configur
         own = _overrides(f"variant {name}", values)
         for point in points:
             words = [name] if name else []
-            words += [f"{parameter}={value if isinstance(value, str) else f'{value:g}'}" for parameter, value in point.items()]
+            words += [
+                f"{parameter}={value if isinstance(value, str) else f'{value:g}'}" for parameter, value in point.items()
+            ]
             yield Configuration(", ".join(words) or NOMINAL, _merged(base, own, _overrides("sweep", point)))
 
 
@@ -185,7 +187,9 @@ def _overrides(source: str, values: Any) -> Overrides:
     overrides: dict[str, dict[str, Any]] = {}
     for target, value in values.items():
         if isinstance(value, dict) or value is None:
-            raise ConfigurationError(f"{source}: {target}: {value!r} is not allowed; it must be a value or a list of them")
+            raise ConfigurationError(
+                f"{source}: {target}: {value!r} is not allowed; it must be a value or a list of them"
+            )
         pattern, name = address_of(target, f"{source}: {target}")
         overrides.setdefault(pattern, {})[name] = value
     return overrides

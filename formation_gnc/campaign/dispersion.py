@@ -55,7 +55,9 @@ class Dispersion:
         """Raise ConfigurationError if a value may be drawn that the parameter cannot have."""
         kind = get_args(leaf.type)[0] if get_origin(leaf.type) is tuple else leaf.type
         if self.mode != "value" and kind not in (int, float):
-            raise ConfigurationError(f"dispersion {self.name}: {AS}: {self.mode} is not allowed; {leaf.name} is no number")
+            raise ConfigurationError(
+                f"dispersion {self.name}: {AS}: {self.mode} is not allowed; {leaf.name} is no number"
+            )
         for extreme in self.distribution.support():
             values = [self._applied(one, extreme) for one in (base if isinstance(base, tuple) else [base])]
             try:
@@ -77,7 +79,9 @@ def dispersion_of(name: str, spec: Any) -> Dispersion:
     default = "offset" if isinstance(spec, dict) and "hill_normal" in spec else "value"
     mode = spec.pop(AS, default) if isinstance(spec, dict) else default
     if mode not in MODES:
-        raise ConfigurationError(f"dispersion {name}: {AS}: {mode!r} is not allowed; it must be one of {', '.join(MODES)}")
+        raise ConfigurationError(
+            f"dispersion {name}: {AS}: {mode!r} is not allowed; it must be one of {', '.join(MODES)}"
+        )
     try:
         return Dispersion(name, distribution_of(spec), mode)
     except ConfigurationError as error:
@@ -181,5 +185,3 @@ def flat(name: str, value: Any) -> dict[str, Any]:
     if isinstance(value, Sequence) and not isinstance(value, str):
         return {f"{name}[{number}]": each for number, each in enumerate(value)}
     return {name: value}
-
-

@@ -161,7 +161,9 @@ class Truncated(Distribution):
         self._whole, self._low, self._high = whole, low, high
         self._below, self._until = whole.probability(low), whole.probability(high)
         if not self._until > self._below:
-            raise ConfigurationError(f"{WITHIN}: [{low!r}, {high!r}] is not allowed; nothing of the distribution is in it")
+            raise ConfigurationError(
+                f"{WITHIN}: [{low!r}, {high!r}] is not allowed; nothing of the distribution is in it"
+            )
 
     def quantile(self, probability: float) -> float:
         """That of the whole, within the bounds."""
@@ -184,7 +186,9 @@ class HillNormal(Distribution):
         for pair, value in (correlation or {}).items():
             components = pair.split()
             if len(components) != 2 or not set(components) <= set(STATE) or components[0] == components[1]:
-                raise ConfigurationError(f"correlation {pair!r}: is unknown; it must be two of {' '.join(STATE)}, as 'x vy'")
+                raise ConfigurationError(
+                    f"correlation {pair!r}: is unknown; it must be two of {' '.join(STATE)}, as 'x vy'"
+                )
             if not isinstance(value, int | float) or not -1.0 <= value <= 1.0:
                 raise ConfigurationError(f"correlation {pair!r}: {value!r} is not allowed; it must be from -1 to 1")
             one, other = map(STATE.index, components)
@@ -230,7 +234,9 @@ def distribution_of(spec: Any) -> Distribution:
         raise ConfigurationError(f"{spec!r} is not allowed; it must be like {{normal: {{mean: 1.0, sigma: 0.1}}}}")
     names = [name for name in spec if name != WITHIN]
     if len(names) != 1:
-        raise ConfigurationError(f"needs one distribution, has {', '.join(names) or 'none'}; known: {', '.join(DISTRIBUTIONS)}")
+        raise ConfigurationError(
+            f"needs one distribution, has {', '.join(names) or 'none'}; known: {', '.join(DISTRIBUTIONS)}"
+        )
     name, numbers = names[0], spec[names[0]]
     if name not in DISTRIBUTIONS:
         raise ConfigurationError(f"distribution {name}: unknown; {nearest(name, DISTRIBUTIONS)}")

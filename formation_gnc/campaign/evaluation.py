@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import nan, sqrt
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from formation_gnc.campaign.case import CASE, REASON
 from formation_gnc.campaign.dataset import Dataset
 from formation_gnc.campaign.definition import Campaign
-from formation_gnc.campaign.flight_figures import BANDS, OF_RUN, band
+from formation_gnc.campaign.flight_figures import BANDS, NUMBERS, OF_RUN, band
 from formation_gnc.campaign.order_statistics import Verdict, allowed_failures, bound, runs_needed, verdict
 from formation_gnc.campaign.requirement import Requirement
 from formation_gnc.errors import ConfigurationError
@@ -101,7 +102,9 @@ class Flights:
     def outcomes(self) -> list[Outcome]:
         """Verdict on every requirement in every configuration."""
         return [
-            self._outcome_of_mean(requirement, each.name) if requirement.of_mean else self._outcome(requirement, each.name)
+            self._outcome_of_mean(requirement, each.name)
+            if requirement.of_mean
+            else self._outcome(requirement, each.name)
             for requirement in self.campaign.requirements
             for each in self.campaign.configurations
         ]
@@ -160,7 +163,11 @@ class Flights:
             freedom += float(weight.values[good].sum())
             runs, lost = len(good), max(lost, int((~good).sum()))
         alarm = 1.0 - requirement.confidence
-        low, high = (chi2.ppf(alarm / 2.0, freedom) / freedom, chi2.isf(alarm / 2.0, freedom) / freedom) if freedom else (nan, nan)
+        low, high = (
+            (chi2.ppf(alarm / 2.0, freedom) / freedom, chi2.isf(alarm / 2.0, freedom) / freedom)
+            if freedom
+            else (nan, nan)
+        )
         mean = total / freedom if freedom else nan
         margin = min(mean - low, high - mean)
         inside = not lost and margin > 0.0
@@ -171,20 +178,26 @@ class Flights:
 
     def drawn(self) -> list[str]:
         """Columns of numbers that were drawn."""
-        begins = [each.name for each in self.campaign.dispersions] + [f"faults.{each.name}" for each in self.campaign.faults]
+        begins = [each.name for each in self.campaign.dispersions] + [
+            f"faults.{each.name}" for each in self.campaign.faults
+        ]
         return [name for name in self.names if any(_is_of(name, begin) for begin in begins)]
 
     def check_drawn(self) -> None:
         """Raise NotAppliedError for a dispersion with the same value in all flights."""
         if self.campaign.runs < 2:
             return
-        names = [each.name for each in self.campaign.dispersions] + [f"faults.{each.name}" for each in self.campaign.faults]
+        names = [each.name for each in self.campaign.dispersions] + [
+            f"faults.{each.name}" for each in self.campaign.faults
+        ]
         for name in names:
             columns = [column for column in self.names if _is_of(column, name)]
             first = self.campaign.configurations[0].name
             table = self.results.table(columns, runs=self.campaign.runs, flights=first)
             if len(table) > 1 and all(len(set(table[column].to_pylist())) < 2 for column in columns):
-                raise NotAppliedError(f"dispersion {name}: has the same value in all {len(table)} flights: it was not applied")
+                raise NotAppliedError(
+                    f"dispersion {name}: has the same value in all {len(table)} flights: it was not applied"
+                )
 
 
 _RELATIONS: dict[str, Any] = {"<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal}
@@ -264,3 +277,20 @@ def require_flights(flights: Flights) -> None:
     """Raise ConfigurationError without any flight."""
     if not flights.names:
         raise ConfigurationError(f"results {flights.results.directory}: have no flight yet")
+
+
+def departing_figures(results: Dataset, case: int, configuration: str, bag: Path) -> list[str] | None:
+    """Figures of a recorded flight that are not, bit for bit, those of its case; None if the case is not there."""
+    from formation_gnc.analysis.figures import figures
+    from formation_gnc.recording.reader import Bag
+
+    names = [name for name in results.names() if name.rpartition(".")[2] in NUMBERS]
+    rows = [row for row in results.table(names, flights=configuration).to_pylist() if row[CASE] == case]
+    if not rows:
+        return None
+    flown = {
+        f"{deputy}.{name}": value
+        for deputy, each in figures(Bag(bag)).deputies.items()
+        for name, value in each.by_name().items()
+    }
+    return [name for name in names if rows[0][name] != flown[name]]

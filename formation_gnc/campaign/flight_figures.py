@@ -18,9 +18,10 @@ from formation_gnc.recording.fields import Fields
 from formation_gnc.records import Estimate, EstimateStatus, Event, EventKind
 from formation_gnc.types import Matrix, Vector
 
-NUMBERS = tuple(
-    name for name, kind in DeputyFigures.__annotations__.items() if kind in (float, int)
-) + ("delta_v_x_m_s", "delta_v_y_m_s", "delta_v_z_m_s")
+NUMBERS = (
+    *(name for name, kind in DeputyFigures.__annotations__.items() if kind in (float, int)),
+    *(f"delta_v_{axis}_m_s" for axis in "xyz"),
+)
 """Figures of the summary that are numbers, each a column for each deputy."""
 
 EXPRESSIONS = {

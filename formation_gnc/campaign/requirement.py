@@ -78,7 +78,9 @@ def requirement_of(text: str, deputies: Collection[str]) -> Requirement:
         raise ConfigurationError(f"requirement {text!r}: {error}") from None
     for name, value in {"share": share, "confidence": confidence}.items():
         if not 0.0 < value < 1.0 and not (mean and name == "share"):
-            raise ConfigurationError(f"requirement {text!r}: {name} is not allowed; it must be above 0 % and below 100 %")
+            raise ConfigurationError(
+                f"requirement {text!r}: {name} is not allowed; it must be above 0 % and below 100 %"
+            )
     return Requirement(words, figure, "band" if band else str(parts["relation"]), limit, share, confidence)
 
 

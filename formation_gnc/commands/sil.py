@@ -79,7 +79,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Fly, record, summarise."""
-    scenario = _scenario(options)
+    return fly(_scenario(options), options)
+
+
+def fly(scenario: Scenario, options: argparse.Namespace) -> int:
+    """Fly a scenario, record and summarise it, with the options of this command."""
     bag = options.bag or _free_directory(scenario.name)
     if bag.exists():
         raise ConfigurationError(f"bag {bag}: exists already; name a directory that does not")

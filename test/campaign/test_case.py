@@ -1,0 +1,76 @@
+"""A case is a pure function of its number, with the figures that a bag of it has."""
+
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+
+from formation_gnc.analysis.figures import figures
+from formation_gnc.campaign.case import drawn_columns, fly_case, scenario_of
+from formation_gnc.campaign.definition import load_campaign
+from formation_gnc.campaign.flight_figures import NUMBERS
+from formation_gnc.cli import main
+from formation_gnc.recording import Bag
+from formation_gnc.sil.runner import Run
+
+
+def test_case_has_the_same_bits_whatever_was_flown_before(write, small):
+    campaign = load_campaign(write(small))
+    configuration = campaign.configurations[0]
+    forth = [fly_case(campaign, case, configuration) for case in (0, 1)]
+    again = [fly_case(load_campaign(write(small)), case, configuration) for case in (1, 0)][::-1]
+    for one, other in zip(forth, again, strict=True):
+        assert one.row == other.row
+        assert all(np.array_equal(one.curves[name], other.curves[name]) for name in one.curves)
+    assert forth[0].row["deputy1.final_error_m"] != forth[1].row["deputy1.final_error_m"]
+
+
+@pytest.mark.usefixtures("without_pictures")
+def test_figures_of_a_case_are_those_of_its_bag_bit_for_bit(write, small, tmp_path, capsys):
+    path, bag = write(small), tmp_path / "bag"
+    assert main(["campaign", str(path), "--only", "3", "--bag", str(bag), "--json"]) == 0
+    capsys.readouterr()
+    campaign = load_campaign(path)
+    row = fly_case(campaign, 3, campaign.configurations[0]).row
+    recorded = figures(Bag(bag)).deputies["deputy1"].by_name()
+    assert {name: row[f"deputy1.{name}"] for name in NUMBERS} == {name: recorded[name] for name in NUMBERS}
+    assert row["deputy1.verdict"] == asdict(figures(Bag(bag)).deputies["deputy1"])["verdict"]
+
+
+def test_row_has_what_was_drawn_as_it_was_flown(write, small):
+    campaign = load_campaign(write(small))
+    for case in range(4):
+        scenario = scenario_of(campaign, case, campaign.configurations[0])
+        columns = drawn_columns(campaign, case, scenario)
+        deputy = scenario.plant.deputy["deputy1"]
+        assert columns["plant.deputy1.mass"] == deputy.mass
+        assert [columns[f"plant.deputy1.relative_state[{axis}]"] for axis in range(6)] == list(deputy.relative_state)
+        assert columns["faults.stuck"] == bool(scenario.plant.faults)
+        if scenario.plant.faults:
+            assert columns["faults.stuck.at"] == scenario.plant.planned_faults[0].fault.at
+
+
+def test_case_that_raises_is_a_row_with_its_reason(write, small, monkeypatch):
+    def fly(self, sink):
+        raise ZeroDivisionError("the filter\ndivided")
+
+    campaign = load_campaign(write(small))
+    monkeypatch.setattr(Run, "fly", fly)
+    flown = fly_case(campaign, 0, campaign.configurations[0])
+    assert flown.row["reason"] == "ZeroDivisionError: the filter divided"
+    assert flown.row["plant.deputy1.mass"] > 0.0
+    assert not flown.curves
+
+
+def test_time_to_within_a_distance_is_when_the_error_stays_there(write, small):
+    text = small.replace(
+        "- final_error_m <", "- time to within 14 m < 400 in 60 % at 80 % confidence\n  - final_error_m <"
+    )
+    campaign = load_campaign(write(text))
+    assert campaign.within == (14.0, 50.0)
+    flown = fly_case(campaign, 0, campaign.configurations[0])
+    error = np.linalg.norm(flown.curves["deputy1"], axis=1)
+    settled = int(flown.row["deputy1.time_within_14_m_s"] / 10.0)
+    assert (error[settled:] <= 14.0).all()
+    assert settled == 0 or error[settled - 1] > 14.0
+    assert flown.row["deputy1.time_within_50_m_s"] == 0.0
