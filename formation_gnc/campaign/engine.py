@@ -147,7 +147,7 @@ def _fly(
         cases = ranges.pop(future.key)
         for again in _finish(future, cases, directory, own):
             pending.add(submit(again))
-        if future.status == "finished" or cases[1] - cases[0] == 1:
+        if future.status != "error" or cases[1] - cases[0] == 1:
             done += cases[1] - cases[0]
         future.release()
         show(done)
@@ -159,10 +159,10 @@ def _finish(future: Any, cases: Range, directory: str, own: tuple[str, str]) -> 
     """Take a result; gives the single cases of a range whose workers died, to be flown again."""
     from distributed import KilledWorker
 
-    if future.status == "finished":
-        return
-    if future.status != "error":
+    if future.status == "cancelled":
         raise CampaignError("the scheduler is gone")
+    if future.status != "error":
+        return  # finished; the part stays when the worker dies with the number that it returned
     error = future.exception()
     if isinstance(error, KilledWorker):
         if cases[1] - cases[0] > 1:

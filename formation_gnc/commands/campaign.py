@@ -28,8 +28,11 @@ if TYPE_CHECKING:
 NOT_MET_STATUS = 3
 """Exit status of a campaign with a requirement that is not met."""
 
-WIDTH = 44
+WIDTH = 27
 """Characters of a line of a requirement in the table."""
+
+SHOWN = ("requirement", "configuration", "verdict", "failures", "allowed", "margin")
+"""Columns of the table; the page has all."""
 
 BLOCKS = 256
 """Parts of the data set that a campaign comes in, about."""
@@ -203,11 +206,9 @@ def _print(
 ) -> None:
     from formation_gnc.campaign.report import OUTCOME_HEAD, outcome_row
 
-    rows = [outcome_row(each) for each in outcomes]
-    columns = [[name, *(row[number] for row in rows)] for number, name in enumerate(OUTCOME_HEAD)]
-    columns[0] = [columns[0][0], *(fill(each, WIDTH) for each in columns[0][1:])]
-    if len(campaign.configurations) == 1:
-        del columns[1]
+    rows = [dict(zip(OUTCOME_HEAD, outcome_row(each), strict=True)) for each in outcomes]
+    shown = [name for name in SHOWN if name != "configuration" or len(campaign.configurations) > 1]
+    columns = [[name, *(fill(row[name], WIDTH) for row in rows)] for name in shown]
     if rows:
         print_table(console, columns, f"{campaign.name}, {campaign.runs} cases")
     flights = campaign.runs * len(campaign.configurations)

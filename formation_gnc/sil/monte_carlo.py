@@ -1,13 +1,11 @@
-"""Monte Carlo samples for the navigation filter, and its consistency in flown scenarios.
+"""Monte Carlo samples for the navigation filter: their truth is exactly as uncertain as its parameters say.
 
-The samples' truth is exactly as uncertain as the filter's parameters say; a scenario's plant has its own errors,
-whatever the filter assumes.
+How consistent it is in flown scenarios, whose plant has errors of its own, is a requirement of a campaign.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import sqrt
-from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,10 +15,8 @@ from formation_gnc.navigation.process import substeps
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.frames import hill_rotation, inertial_from_relative, relative_from_inertial
 from formation_gnc.orbit.propagation import Propagator
-from formation_gnc.records import Estimate, EstimateStatus, Measurement, Reading
+from formation_gnc.records import Estimate, Measurement, Reading
 from formation_gnc.sensors.registry import sensors
-from formation_gnc.sil.runner import Run
-from formation_gnc.sil.scenario import load_scenario
 from formation_gnc.types import Vector
 
 DEPUTY = "deputy1"
@@ -106,36 +102,3 @@ def nees(estimate: Estimate, truth: Vector) -> float:
     """Normalised estimation error squared (NEES): 6 on average for a consistent filter."""
     error = estimate.relative_state - truth
     return float(error @ np.linalg.solve(estimate.covariance, error))
-
-
-class FlightStatistics(NamedTuple):
-    """Of all filters of a flight, at the ticks at which they used readings."""
-
-    nees: float
-    """Mean, 6 for a consistent filter."""
-    nis: float
-    """Mean by value used, 1 for a consistent filter."""
-    values: int
-    """Number of values used."""
-
-
-def flight_statistics(scenario: str, seed: int, duration: float) -> FlightStatistics:
-    """Fly a scenario without recording it, and compare its estimates with the truth.
-
-    Args:
-        scenario: its name in params/, or its file.
-        seed: of all noise.
-        duration: s.
-    """
-    run = Run(load_scenario(scenario, {"/**/plant": {"seed": seed, "duration": duration}}))
-    records: dict[str, Any] = {}
-    squares, nis, values = [], 0.0, 0
-    while not run.plant.finished:
-        run.tick(records.__setitem__)
-        for deputy in records["/truth"].deputies:
-            estimate = records[f"/{deputy.name}/estimate"]
-            used = sum(len(each.values) for each in estimate.innovations if not each.rejection)
-            if estimate.status == EstimateStatus.TRACKING and used:
-                squares.append(nees(estimate, deputy.relative_state))
-                nis, values = nis + estimate.nis, values + used
-    return FlightStatistics(float(np.mean(squares)), nis / values, values)

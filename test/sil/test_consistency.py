@@ -1,16 +1,16 @@
-"""NEES and NIS of every shipped scenario over a hundred seeds, with the truth's own forces."""
+"""NEES and NIS of shipped scenarios over a hundred flights, with the truth's own forces."""
 
-from concurrent.futures import ProcessPoolExecutor
-from functools import partial
-from multiprocessing import get_context
+from pathlib import Path
 
-import numpy as np
 import pytest
-from scipy.stats import chi2
 
-from formation_gnc.sil.monte_carlo import flight_statistics
+from formation_gnc.campaign.dataset import Dataset
+from formation_gnc.campaign.definition import load_campaign
+from formation_gnc.campaign.engine import Cluster, fly
+from formation_gnc.campaign.evaluation import Flights
+from formation_gnc.campaign.version import software_version
 
-SEEDS = 100
+RUNS = 100
 
 DURATION = {
     "leader_follower": 6000.0,
@@ -22,22 +22,23 @@ DURATION = {
 """Time that is flown, s: an orbit, two at GEO, where unmodelled forces add up. Less of the fleets, which have four and
 eight filters to a flight, and the forces of leader_follower."""
 
-ALARM = 1e-4
-"""Probability that a consistent filter leaves a band."""
-
-
-def is_within_band(mean: float, freedom: int) -> bool:
-    """Whether the mean of chi-square variables, over what is expected, is as far from 1 as these all together allow."""
-    return bool(chi2.ppf(ALARM / 2.0, freedom) < mean * freedom < chi2.isf(ALARM / 2.0, freedom))
+CAMPAIGN = """
+scenario: {scenario}
+runs: {runs}
+set: {{plant.duration: {duration}}}
+requirements:
+  - mean NEES inside its band at 99.99 % confidence
+  - mean NIS inside its band at 99.99 % confidence
+"""
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scenario", list(DURATION))
-def test_nees_and_nis_of_shipped_scenarios_are_within_their_bands(scenario: str) -> None:
+def test_nees_and_nis_of_shipped_scenarios_are_within_their_bands(scenario: str, tmp_path: Path) -> None:
     """NEES changes slowly: its mean over time scatters at most as at one time. Innovations are independent."""
-    fly = partial(flight_statistics, scenario, duration=DURATION[scenario])
-    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
-        flights = list(pool.map(fly, range(1, SEEDS + 1)))
-    nees, nis, values = np.array(flights).T
-    assert is_within_band(nees.mean() / 6.0, 6 * SEEDS)
-    assert is_within_band(nis @ values / values.sum(), round(values.sum()))
+    path = tmp_path / f"{scenario}.yaml"
+    path.write_text(CAMPAIGN.format(scenario=scenario, runs=RUNS, duration=DURATION[scenario]))
+    campaign, results = load_campaign(path), Dataset(tmp_path / "results")
+    results.create(campaign, software_version(), "", 1)
+    fly(campaign, results, Cluster(), lambda done, workers: None)
+    assert [each.verdict for each in Flights(campaign, results).outcomes()] == ["met", "met"]
