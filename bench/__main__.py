@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from bench import control, dynamics, fleet, graph, navigation, plans, recording
+from bench import campaign, control, dynamics, fleet, graph, navigation, plans, recording
 from bench.result import Result
 
 BENCHMARKS = {
@@ -20,6 +20,7 @@ BENCHMARKS = {
     "control": control.run,
     "plans": plans.run,
     "recording": recording.run,
+    "campaign": campaign.run,
 }
 OUTPUT = Path("build/bench.json")
 

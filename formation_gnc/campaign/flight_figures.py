@@ -16,6 +16,7 @@ from formation_gnc.analysis.verdict import Verdict
 from formation_gnc.flight import topics
 from formation_gnc.recording.fields import Fields
 from formation_gnc.records import Estimate, EstimateStatus, Event, EventKind
+from formation_gnc.sil.monte_carlo import nees
 from formation_gnc.types import Matrix, Vector
 
 NUMBERS = (
@@ -116,9 +117,8 @@ class _Deputy:
             self.law = record.algorithm
 
     def _nees_of(self, estimate: Estimate) -> float:
-        error = estimate.relative_state - self.truth.last(6)
         try:
-            return float(error @ np.linalg.solve(estimate.covariance, error))
+            return nees(estimate, self.truth.last(6))
         except np.linalg.LinAlgError:
             return float("nan")
 
