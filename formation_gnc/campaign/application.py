@@ -120,12 +120,15 @@ def _varied(campaign: Campaign, configuration: Configuration, case: int, dispers
 
 
 def _fly_differently(one: Scenario, other: Scenario) -> bool:
-    """Whether two flights differ in any record of any tick; they end where they do."""
+    """Whether two flights differ in any record of any tick; they end where they do, or where one of them raises."""
     runs = [Run(one), Run(other)]
     while not runs[0].plant.finished and not runs[1].plant.finished:
         records: list[dict[str, Any]] = [{}, {}]
         for run, sink in zip(runs, records, strict=True):
-            run.tick(sink.__setitem__)
+            try:
+                run.tick(sink.__setitem__)
+            except Exception:
+                return True  # to be a row with its reason, which is no matter of this check
         if not _same(*records):
             return True
     return runs[0].plant.finished != runs[1].plant.finished

@@ -87,7 +87,8 @@ def _client(cluster: Cluster) -> Iterator[Any]:
     from distributed import Client, LocalCluster
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
-    with dask.config.set({"distributed.scheduler.allowed-failures": 3, "distributed.logging.distributed": "critical"}):
+    settings = {"distributed.scheduler.allowed-failures": 3, "distributed.comm.timeouts.connect": "120s"}
+    with dask.config.set(settings):
         if cluster.scheduler or cluster.scheduler_file:
             given = {"address": cluster.scheduler} if cluster.scheduler else {"scheduler_file": cluster.scheduler_file}
             place = cluster.scheduler or cluster.scheduler_file
@@ -138,7 +139,7 @@ def _fly(
         return client.submit(fly_range, directory, *own, cases, key=key, pure=False)
 
     def most() -> int:
-        return AHEAD * max(1, sum(client.nthreads().values()))
+        return AHEAD * max(1, sum(map(int, client.nthreads().values())))
 
     ranges: dict[str, Range] = {}
     show(done)

@@ -167,8 +167,9 @@ def _in_two(plots: list[Plot]) -> list[list[Plot]]:
 
 
 def _interval_plot(pairs: Sequence[Difference]) -> Plot:
-    numbers = (np.array([getattr(each, name) for each in pairs]) for name in ("mean", "low", "high"))
-    return interval_plot([each.configuration for each in pairs], *numbers, pairs[0].figure, pairs[0].reference)
+    mean, low, high = (np.array([getattr(each, name) for each in pairs]) for name in ("mean", "low", "high"))
+    names = [each.configuration for each in pairs]
+    return interval_plot(names, mean, low, high, pairs[0].figure, pairs[0].reference)
 
 
 def _differences(flights: Flights) -> str:

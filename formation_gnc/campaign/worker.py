@@ -4,11 +4,14 @@ import os
 from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 from formation_gnc.campaign.case import CASE, VARIANT, fly_case
 from formation_gnc.campaign.dataset import Dataset, Range, curve_rows
 from formation_gnc.campaign.definition import Campaign
 from formation_gnc.campaign.version import software_version
+
+Row = dict[str, Any]
 
 
 class VersionError(RuntimeError):
@@ -47,7 +50,7 @@ def fly_range(directory: str, identity: str, version: str, cases: Range) -> int:
     if not results.directory.is_dir():
         raise UnseenDirectoryError(f"results {directory}: a worker on {os.uname().nodename} does not see the directory")
     campaign = _campaign(results.directory, identity)
-    rows, curves, timing = [], [], []
+    rows, curves, timing = list[Row](), list[Row](), list[Row]()
     for case in range(*cases):
         for configuration in campaign.configurations:
             started = perf_counter()

@@ -112,14 +112,17 @@ def _open(campaign: Campaign, results: "Dataset", resume: bool, console: Console
         manifest = results.manifest
         if manifest["identity"] != campaign.identity:
             raise ConfigurationError(f"results {directory}: are of another campaign, or of this one before a change")
-        if not resume:
-            raise ConfigurationError(f"results {directory}: exist already; --resume goes on, --out names another place")
-        if manifest["version"] != software_version():
-            raise ConfigurationError(
-                f"results {directory}: are of formation_gnc {manifest['version']}, this is {software_version()}"
-            )
-        return
-    if resume:
+        if results.done():
+            if not resume:
+                raise ConfigurationError(
+                    f"results {directory}: exist already; --resume goes on, --out names another place"
+                )
+            if manifest["version"] != software_version():
+                raise ConfigurationError(
+                    f"results {directory}: are of formation_gnc {manifest['version']}, this is {software_version()}"
+                )
+            return
+    elif resume:
         raise ConfigurationError(f"results {directory}: there are none to go on with; leave --resume out")
     with console.status("checking that every dispersion is applied") as status:
         check_application(campaign, status.update)
