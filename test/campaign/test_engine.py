@@ -138,7 +138,7 @@ def test_killed_client_goes_on_with_what_is_done(file, cluster, flown_alone, tmp
     )
     client = subprocess.Popen([sys.executable, "-c", code, *words], stderr=subprocess.PIPE, text=True)
     wait_until(lambda: parts(out) >= 1, "a part")
-    os.kill(client.pid, signal.SIGINT)
+    os.kill(client.pid, signal.SIGTERM)
     error = client.communicate(timeout=PATIENCE)[1]
     assert client.returncode == 130
     assert f"of {RUNS} cases kept in {out}, --resume goes on" in error
