@@ -86,7 +86,8 @@ def _client(cluster: Cluster) -> Iterator[Any]:
     import dask
     from distributed import Client, LocalCluster
 
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    for name in ("distributed", "tornado.application"):  # what they say of an interrupt is no news
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     settings = {"distributed.scheduler.allowed-failures": 3, "distributed.comm.timeouts.connect": "120s"}
     with dask.config.set(settings):
         if cluster.scheduler or cluster.scheduler_file:

@@ -18,6 +18,7 @@ _SHARE = f" in {_PERCENT.format('share')} at {_PERCENT.format('confidence')} con
 _STATEMENT = re.compile(rf"(?P<figure>.+?) (?:{_COMPARED}|(?P<band>inside its band)){_SHARE}")
 _MEAN = re.compile(rf"mean (?P<figure>.+?) inside its band at {_PERCENT.format('confidence')} confidence")
 _WITHIN = re.compile(WITHIN_TITLE.format(r"([0-9.eE+]+)"))
+_WITHIN_NAME = re.compile(r"time_within_(.+)_m_s$")
 
 
 @dataclass(frozen=True)
@@ -48,8 +49,8 @@ class Requirement:
     @property
     def within(self) -> float | None:
         """Distance (m) of a `time to within`; None for any other figure."""
-        name = self.figure.rpartition(".")[2]
-        return float(name.split("_")[2]) if name.startswith("time_within_") else None
+        found = _WITHIN_NAME.search(self.figure)
+        return float(found[1]) if found else None
 
 
 def requirement_of(text: str, deputies: Collection[str]) -> Requirement:
