@@ -229,7 +229,9 @@ def test_the_run_does_not_start_while_another_publishes_its_topics(complete: Gra
     assert complete.said[-1] == "flying"
 
 
-@pytest.mark.parametrize("topic", ["/clock", "/truth", "/deputy1/measurement", "/recorder/progress", *sorted(EVERYBODY)])
+@pytest.mark.parametrize(
+    "topic", ["/clock", "/truth", "/deputy1/measurement", "/recorder/progress", *sorted(EVERYBODY)]
+)
 def test_another_publisher_in_flight_is_named_once_and_withstood(complete: Graph, topic: str) -> None:
     executive = start(complete, ticks=3)
     complete.others = {topic: ["/other"]}
