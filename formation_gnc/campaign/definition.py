@@ -15,7 +15,7 @@ from formation_gnc.campaign.dispersion import DispersedFault, Dispersion, disper
 from formation_gnc.campaign.distributions import LEAST, distribution_of
 from formation_gnc.campaign.requirement import Requirement, requirement_of
 from formation_gnc.errors import ConfigurationError, nearest
-from formation_gnc.parameter_yaml import RejectedYamlError
+from formation_gnc.limited_yaml import RejectedYamlError
 from formation_gnc.parameters import read_yaml
 from formation_gnc.randomness import generator
 from formation_gnc.sil.overrides import address_of
