@@ -3,7 +3,7 @@
 import sys
 from datetime import UTC, datetime
 from functools import partial
-from itertools import chain, count, pairwise
+from itertools import count, pairwise
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -116,9 +116,11 @@ class RecorderNode(ConfiguredNode):
 
 
 def free_directory(wanted: Path) -> Path:
-    """A directory that does not exist: the one wanted, or with a number behind its name."""
+    """The directory wanted, or, where a bag is, the first with a number behind its name that does not exist."""
+    if not (wanted.is_dir() and (any(wanted.glob("*.mcap")) or (wanted / "metadata.yaml").exists())):
+        return wanted  # of anything else the writer says what is wrong
     numbered = (wanted.with_name(f"{wanted.name}_{number}") for number in count(2))
-    return next(each for each in chain([wanted], numbered) if not each.exists())
+    return next(each for each in numbered if not each.exists())
 
 
 def record(node: RecorderNode) -> None:

@@ -26,6 +26,8 @@ def test_a_recorder_goes_on_in_the_next_directory_that_is_free(tmp_path: Path) -
     wanted = tmp_path / "bag"
     assert free_directory(wanted) == wanted
     wanted.mkdir()
+    assert free_directory(wanted) == wanted, "no bag: the writer refuses it"
+    (wanted / "bag_0.mcap").touch()
     assert free_directory(wanted) == tmp_path / "bag_2"
     (tmp_path / "bag_2").mkdir()
     assert free_directory(wanted) == tmp_path / "bag_3"

@@ -53,7 +53,10 @@ def test_what_is_no_entry_is_refused_with_an_example(entry: str) -> None:
         ("fault: bias, sensor: radius, valu: 1.0", "valu: is no field of bias; did you mean value?"),
         ("fault: bias, sensor: radius, value: .nan", "value: nan is not allowed; it must be finite"),
         ("fault: bias, sensor: radius, value: -.inf", "value: -inf is not allowed; it must be finite"),
-        ("fault: bias, sensor: radius, value: 20 m", "value: '20 m' is not allowed; it must be a value of type"),
+        (
+            "fault: bias, sensor: radius, value: 20 m",
+            "value: '20 m': unit 'm' is not allowed; it must be a number alone",
+        ),
         ("fault: bias, sensor: radius, value: [1.0, 2.0]", "value: [1.0, 2.0] is not allowed; it must be one number"),
         ("fault: drift, sensor: radius, rate: []", "rate: [] is not allowed; it must be one number"),
         ("fault: bias, sensor: radius, value: [1, 2.0]", "is not YAML as ROS 2 reads it, line 1: the values of a list"),
