@@ -13,4 +13,9 @@ colcon build --event-handlers desktop_notification- status-
 # Compile the Numba kernels now, and once: the nodes of the first flight would each do it, all at the same time.
 source install/setup.bash
 cd install
-python -c 'import formation_gnc.nodes.plant, formation_gnc.nodes.module'
+python -c '
+import formation_gnc.nodes.plant
+from formation_gnc.flight.graph import GRAPH
+for row in GRAPH:
+    row.module
+'
