@@ -1,6 +1,6 @@
 """What counts of a topic: messages of one publisher that fit their type."""
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from time import monotonic
 from typing import Any
@@ -12,8 +12,9 @@ Information = dict[str, Any]
 """What is known of a message: `publisher` (identity, bytes), `source_timestamp` (ns, system clock) and
 `publication_sequence_number` (None for none)."""
 
-HELD = 64
-"""Messages kept of who may succeed the publisher before, the latest."""
+HELD = 20_000
+"""Messages kept of who may succeed the publisher before, the latest: those of a second of the fastest flight are fewer,
+and none of a node that was started again is lost to the recorder."""
 
 
 class Reception[T]:
@@ -44,7 +45,7 @@ class Reception[T]:
         self.misfits: Counter[str] = Counter()
         """Messages that do not fit, by the name of the node."""
         self._decode, self._take = decode, take
-        self._held: list[tuple[bytes, Information]] = []
+        self._held = deque[tuple[bytes, Information]](maxlen=HELD)
         self._said: set[str] = set()
         self._new: list[str] = []
 
@@ -56,7 +57,7 @@ class Reception[T]:
         if verdict is Verdict.COUNTS:
             self._count(data, about)
         elif verdict is Verdict.HELD:
-            self._held = [*self._held[1 - HELD :], (data, about)]
+            self._held.append((data, about))
         else:
             name, heard = (self.lock.name_of(each, now) for each in (publisher, self.lock.chosen or b""))
             twin = ", another process," if name == heard else ""
@@ -67,7 +68,8 @@ class Reception[T]:
         if self._held and self.lock.candidate is None:
             self._held.clear()
         if self._held and self.lock.succeeds(monotonic()):
-            held, self._held = self._held, []
+            held = list(self._held)
+            self._held.clear()
             for data, about in held:
                 if about["publisher"] == self.lock.chosen:
                     self._count(data, about)
