@@ -25,11 +25,6 @@ _FACTORS: dict[str, dict[str, float]] = {
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s+(\S.*?)\s*")
 
 
-def units_of(unit: str) -> tuple[str, ...]:
-    """Units that a value in an SI unit may be given in."""
-    return ("a date, as 2026-11-28T12:00:00Z",) if unit == EPOCH_UNIT else tuple(_FACTORS.get(unit, ()))
-
-
 def to_si(text: str, unit: str) -> float | None:
     """Value in an SI unit of a text such as `97.4 deg`, or of a date; None for a text that is neither.
 
@@ -42,11 +37,11 @@ def to_si(text: str, unit: str) -> float | None:
     if found is None:
         return None
     number, given = found.groups()
-    factor = _FACTORS.get(unit, {}).get(given)
-    if factor is None:
-        known = ", ".join(units_of(unit)) or "a number alone"
+    factors = _FACTORS.get(unit, {})
+    if given not in factors:
+        known = ", ".join(factors) or "a number alone"
         raise ConfigurationError(f"unit {given!r} is not allowed; it must be {known}")
-    return float(number) * factor
+    return float(number) * factors[given]
 
 
 def _since_j2000(text: str) -> float | None:

@@ -1,6 +1,5 @@
 """A campaign's file: scenario, dispersions, faults, variants, sweep and requirements, checked before anything flies."""
 
-import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
@@ -10,7 +9,6 @@ from typing import Any
 
 import yaml
 
-import formation_gnc
 from formation_gnc.campaign.dispersion import DispersedFault, Dispersion, dispersion_of, fault_of
 from formation_gnc.campaign.distributions import LEAST, distribution_of
 from formation_gnc.campaign.requirement import Requirement, requirement_of
@@ -18,6 +16,7 @@ from formation_gnc.errors import ConfigurationError, nearest
 from formation_gnc.limited_yaml import RejectedYamlError
 from formation_gnc.parameters import read_yaml
 from formation_gnc.randomness import generator
+from formation_gnc.shipped import find_shipped
 from formation_gnc.sil.overrides import address_of
 from formation_gnc.sil.scenario import find_scenario, load_scenario
 
@@ -83,25 +82,7 @@ class Campaign:
 
 def find_campaign(name: str) -> Path:
     """Path of a campaign's file, given its name in `campaigns/` or its path."""
-    if name.endswith((".yaml", ".yml")) or "/" in name:
-        if not Path(name).is_file():
-            raise ConfigurationError(f"campaign {name}: no such file")
-        return Path(name)
-    directories = list(_directories())
-    for directory in directories:
-        if (directory / f"{name}.yaml").is_file():
-            return directory / f"{name}.yaml"
-    known = sorted(path.stem for directory in directories for path in directory.glob("*.yaml"))
-    raise ConfigurationError(f"campaign {name}: unknown; it must be a file or one of {', '.join(known)}")
-
-
-def _directories() -> Iterator[Path]:
-    source = Path(formation_gnc.__file__).resolve().parents[1]
-    if (source / "package.xml").is_file():
-        yield source / "campaigns"
-        return
-    for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep):
-        yield Path(prefix) / "share" / "formation_gnc" / "campaigns"
+    return find_shipped(name, "campaign", "campaigns", "a file")
 
 
 def load_campaign(path: Path, runs: int | None = None, scenario: Path | None = None) -> Campaign:

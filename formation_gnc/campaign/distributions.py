@@ -219,11 +219,6 @@ DISTRIBUTIONS: dict[str, type[Distribution]] = {
 }
 
 
-def is_distribution(spec: Any) -> bool:
-    """Whether a value of the file is meant as a distribution."""
-    return isinstance(spec, dict)
-
-
 def distribution_of(spec: Any) -> Distribution:
     """Distribution from the file's form, as `{normal: {mean: 1.0, sigma: 0.1}, within: [0.8, 1.2]}`.
 

@@ -14,7 +14,6 @@ from formation_gnc.campaign.definition import Campaign
 from formation_gnc.campaign.flight_figures import BANDS, NUMBERS, OF_RUN, band
 from formation_gnc.campaign.order_statistics import Verdict, allowed_failures, bound, runs_needed, verdict
 from formation_gnc.campaign.requirement import Requirement
-from formation_gnc.errors import ConfigurationError
 from formation_gnc.types import Vector
 
 
@@ -271,12 +270,6 @@ def differences(flights: Flights, figure: str, upper: bool = True) -> list[Diffe
             better = float(np.mean(pairs < 0.0))
             found.append(Difference(name, names[0], figure, mean, mean - half, mean + half, better, len(pairs)))
     return found
-
-
-def require_flights(flights: Flights) -> None:
-    """Raise ConfigurationError without any flight."""
-    if not flights.names:
-        raise ConfigurationError(f"results {flights.results.directory}: have no flight yet")
 
 
 def departing_figures(results: Dataset, case: int, configuration: str, bag: Path) -> list[str] | None:

@@ -1,10 +1,10 @@
 """Orbits of satellites from files of others."""
 
 from abc import ABC, abstractmethod
-from typing import Any
 
 import numpy as np
 
+from formation_gnc.interchange.times import instant
 from formation_gnc.types import Vector
 
 METRES = 1e3
@@ -40,14 +40,6 @@ class OrbitSource(ABC):
         """
 
 
-def timescale_time(time: float) -> Any:
-    """Skyfield's time of s of TT since J2000.0."""
-    from skyfield.api import load  # takes long to import
-
-    day, second = divmod(time, 86400.0)
-    return load.timescale(builtin=True).tt_jd(2451545.0 + day, second / 86400.0)
-
-
 def to_j2000(state: Vector, frame: str, time: float) -> Vector:
     """(6,) state along the axes of J2000 of one in another frame, m and m/s.
 
@@ -68,7 +60,7 @@ def to_j2000(state: Vector, frame: str, time: float) -> Vector:
     moving = {"TEME": TEME, "ITRF": itrs}.get(frame)
     if moving is not None:
         there = Distance(m=state[:3]), Velocity(km_per_s=state[3:] / METRES)
-        seen = ICRF.from_time_and_frame_vectors(timescale_time(time), moving, *there)
+        seen = ICRF.from_time_and_frame_vectors(instant(time), moving, *there)
         state = np.concatenate((seen.position.m, seen.velocity.km_per_s * METRES))
     turn = np.array(ICRS_to_J2000)
     return np.concatenate((turn @ state[:3], turn @ state[3:]))

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from formation_gnc.errors import OrbitError
-from formation_gnc.interchange.source import METRES, OrbitSource, timescale_time, to_j2000
+from formation_gnc.interchange.source import METRES, OrbitSource, to_j2000
+from formation_gnc.interchange.times import instant, timescale
 from formation_gnc.types import Vector
 
 DAY = 86400.0
@@ -20,10 +21,10 @@ class TwoLineElements(OrbitSource):
     def __init__(self, name: str, one: str, two: str) -> None:
         """Read the lines; raises ValueError for what is no element set."""
         from sgp4.io import verify_checksum
-        from skyfield.api import EarthSatellite, load  # take long to import
+        from skyfield.api import EarthSatellite  # takes long to import
 
         verify_checksum(one, two)
-        self._satellite = EarthSatellite(one, two, name, load.timescale(builtin=True))
+        self._satellite = EarthSatellite(one, two, name, timescale())
         self.name = name or f"satellite {self._satellite.model.satnum}"
         epoch = self._satellite.epoch
         self.reference = float((epoch.whole - 2451545.0 + epoch.tt_fraction) * DAY)
@@ -36,7 +37,7 @@ class TwoLineElements(OrbitSource):
             raise OrbitError(
                 f"{self.name}: {away:.1f} days from the epoch of its TLE; at most {MOST_DAYS:g} are allowed"
             )
-        seen = self._satellite.at(timescale_time(time))
+        seen = self._satellite.at(instant(time))
         if seen.message:
             raise OrbitError(f"{self.name}: SGP4: {seen.message}")
         return to_j2000(np.concatenate((seen.position.m, seen.velocity.km_per_s * METRES)), "GCRF", time)

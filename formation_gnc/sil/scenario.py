@@ -2,7 +2,6 @@
 
 import difflib
 import math
-import os
 import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -13,12 +12,12 @@ from typing import Any
 
 import yaml
 
-import formation_gnc
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight.graph import GRAPH, MODULES, PLANT
 from formation_gnc.limited_yaml import RejectedYamlError
 from formation_gnc.parameters import OWN_OF_ROS, dump, leaves, load, read_yaml
 from formation_gnc.plant.parameters import PlantParameters
+from formation_gnc.shipped import find_shipped
 from formation_gnc.sil.following import SHARED, departures, with_followed
 
 SECTION = "ros__parameters"
@@ -150,17 +149,7 @@ def _load_modules(sections: Sections, plant: Mapping[str, Any], deputy: str) -> 
 
 def find_scenario(name: str) -> Path:
     """Path of a scenario's file, given its name or its path."""
-    if name.endswith((".yaml", ".yml")) or "/" in name:
-        path = Path(name)
-        if not path.is_file():
-            raise ConfigurationError(f"scenario {name}: no such file")
-        return path
-    directories = [directory for directory in _directories() if directory.is_dir()]
-    for directory in directories:
-        if (directory / f"{name}.yaml").is_file():
-            return directory / f"{name}.yaml"
-    known = sorted(path.stem for directory in directories for path in directory.glob("*.yaml"))
-    raise ConfigurationError(f"scenario {name}: unknown; it must be a parameter file or one of {', '.join(known)}")
+    return find_shipped(name, "scenario", "params", "a parameter file")
 
 
 def sources(name: str, overrides: Mapping[str, Mapping[str, Any]], node: str) -> dict[str, str]:
@@ -210,15 +199,6 @@ def _nearest(pattern: str, patterns: Sequence[str]) -> str:
 def sections_given_to(path: Path, names: Collection[str]) -> Sections:
     """Sections of a parameter file for a node that has these names: pattern of nodes, and values by dotted name."""
     return [(pattern, section) for pattern, section in _sections(path) if any(matches(pattern, name) for name in names)]
-
-
-def _directories() -> Iterator[Path]:
-    source = Path(formation_gnc.__file__).resolve().parents[1]
-    if (source / "package.xml").is_file():
-        yield source / "params"
-        return
-    for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep):
-        yield Path(prefix) / "share" / "formation_gnc" / "params"
 
 
 def _load(schema: Any, values: Mapping[str, Any], node: str) -> Any:
