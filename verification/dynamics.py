@@ -18,6 +18,7 @@ from formation_gnc.orbit.forces.force import Body
 from formation_gnc.orbit.forces.model import Forces
 from formation_gnc.orbit.frames import relative_from_inertial
 from formation_gnc.orbit.propagation import Propagator
+from verification.coverage.marker import covers
 from verification.figure import TABLE, Figure, failures
 from verification.independent import Basilisk, Heyoka, Places, jpl, series
 
@@ -225,6 +226,48 @@ Earth's axis:
 ![Energy](dynamics_energy.png)
 """
     return text, figures
+
+
+covers(
+    "Neokleous Fig. 2.4",
+    "orbit/forces/zonal.py",
+    figures=("J2 at GEO, largest change of radius",),
+    differs=("the plot is lost in the text; ours is dynamics_geo.png, from a Kepler orbit, his from one with J2 in it"),
+)
+covers(
+    "Neokleous Fig. 2.9",
+    "orbit/forces/third_body.py",
+    figures=("Fig. 2.9, Moon, after two days",),
+    differs=(
+        "the plot is lost in the text; ours is dynamics_geo.png, beside Basilisk; his (2.22) makes the "
+        "difference of two attractions vanish"
+    ),
+)
+covers(
+    "Neokleous Fig. 2.10",
+    "orbit/forces/third_body.py",
+    figures=("Fig. 2.10, Sun, after two days",),
+    differs=(
+        "the plot is lost in the text; ours is dynamics_geo.png, beside Basilisk; his (2.22) makes the "
+        "difference of two attractions vanish"
+    ),
+)
+covers(
+    "Neokleous Fig. 2.12",
+    "orbit/forces/third_body.py",
+    figures=("Fig. 2.12, J2, Moon and Sun, after two days",),
+    differs=(
+        "the plot is lost in the text; ours is dynamics_geo.png, beside Basilisk; his (2.22) makes the "
+        "difference of two attractions vanish"
+    ),
+)
+covers(
+    (
+        "Neokleous Fig. 1.1; Fig. 2.1; Fig. 2.2; Fig. 2.3; Fig. 2.5; Fig. 2.6; Fig. 2.7; Fig. 2.8; Fig. "
+        "2.11; Fig. 3.1; Fig. 3.2; Fig. 4.1; Fig. 5.1; Fig. 5.3; Fig. 5.4; Fig. 5.5; Fig. 5.6; Fig. 5.7"
+    ),
+    impossible="a drawing, with nothing to compute",
+)
 
 
 def neokleous(directory: Path) -> tuple[str, list[Figure]]:

@@ -29,6 +29,7 @@ from formation_gnc.relative.schweighart_sedwick import (
     SchweighartSedwickNodalModel,
 )
 from formation_gnc.relative.tschauner_hempel import TschaunerHempelModel
+from verification.coverage.marker import covers
 from verification.figure import TABLE, Figure, failures
 
 mpl.use("Agg")
@@ -83,6 +84,38 @@ def march(model: RelativeModel, start: Array, times: Array) -> Array:
     for time, following in itertools.pairwise(times.tolist()):
         states.append(model.propagate(time, states[-1], following - time))
     return np.array(states)
+
+
+covers(
+    "Roberts Fig. 7",
+    "relative/schweighart_sedwick.py",
+    "relative/hill.py",
+    figures=(
+        "Fig. 7a, Hill, radial",
+        "Fig. 7a, Hill, along-track",
+        "Fig. 7b, averaged, radial",
+        "Fig. 7b, averaged, along-track",
+        "Fig. 7, cross-track of the truth",
+    ),
+)
+covers(
+    "Roberts Fig. 10",
+    "relative/j2_gradient.py",
+    figures=(
+        "Fig. 10, radial over Hill's",
+        "Fig. 10, along-track over Hill's",
+    ),
+)
+covers(
+    "Roberts Fig. 12",
+    "relative/j2_gradient.py",
+    figures=(
+        "Fig. 12, correlation of radial motion",
+        "Fig. 12, along-track drift",
+        "Fig. 12, cross-track over the truth's",
+    ),
+)
+covers("Roberts Fig. 1; Fig. 2", impossible="a drawing, with nothing to compute")
 
 
 def roberts(directory: Path) -> tuple[str, list[Figure]]:

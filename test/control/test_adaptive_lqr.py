@@ -51,6 +51,7 @@ def double_integrator():
     return Regulator(dynamics, np.eye(6), np.eye(3), cost_to_go)
 
 
+@pytest.mark.covers("Joshi (8.1)-(8.5)", "control/adaptive_lqr.py", "control/networks.py")
 def test_with_zero_weights_the_law_is_lqr(law, common, vehicle, estimate, target):
     state = np.array([10.0, -20.0, 5.0, 0.01, 0.0, -0.02])
     plain = LinearQuadraticRegulator(LqrParameters(gain="continuous", **ROBERTS), common, vehicle)
@@ -60,6 +61,7 @@ def test_with_zero_weights_the_law_is_lqr(law, common, vehicle, estimate, target
     np.testing.assert_allclose(force, plain.command(estimate(state), target()).force, rtol=1e-9)
 
 
+@pytest.mark.covers("Joshi (8.9)-(8.18)", "control/networks.py")
 def test_a_constant_acceleration_is_identified_with_a_double_pole():
     """d - d_hat = d (1 + t / T) exp(-t / T) for constant basis functions."""
     networks, d, tick, time = Networks(double_integrator(), 5.0, 0.1), np.array([0.3, -0.2, 0.1]), 0.01, 5.0
@@ -78,6 +80,7 @@ def test_a_constant_acceleration_is_identified_with_a_double_pole():
     assert np.abs(np.array(left) - expected).max() < 0.01 * np.abs(d).max()  # Euler's method: order tick / time
 
 
+@pytest.mark.covers("Joshi (8.28)-(8.30)", "control/networks.py", differs="(8.28) has Q for R")
 def test_the_costate_converges_to_the_optimum_at_constant_acceleration():
     """The stationary optimum is lambda = -(A - G P)^-T P B d, G = B R^-1 B'."""
     regulator, d, tick = double_integrator(), np.array([0.3, -0.2, 0.1]), 0.02

@@ -57,6 +57,12 @@ def test_without_a_state_weight_it_is_the_minimum_norm_solution():
 
 
 @pytest.mark.parametrize("share", [0.0, 1.0])
+@pytest.mark.covers(
+    "Owis (1.4); (1.5)",
+    "control/fixed_endpoint_lq.py",
+    differs="the condensed solution of the same problem in place of the Riccati equation integrated backwards",
+)
+@pytest.mark.covers("Neokleous (4.1)-(4.4)", "control/fixed_endpoint_lq.py")
 def test_with_weights_it_satisfies_the_kkt_conditions(share):
     """KKT system in all inputs and multipliers at once; soft terminal constraint for share 1."""
     phi, gamma = varying(12)
@@ -76,6 +82,7 @@ def test_with_weights_it_satisfies_the_kkt_conditions(share):
     assert missed < 1e-6 if share == 0.0 else missed > 1.0
 
 
+@pytest.mark.covers("Owis (1.1)-(1.3)", "control/fixed_endpoint_lq.py")
 def test_short_steps_converge_to_the_hamiltonian_transition_matrix():
     """Joshi (5.13)-(5.16), with the sign of (5.11) corrected and a weight on the state."""
     model, q, r = HillModel(6.3e-4), np.diag((1000.0 * UNIT) ** -2.0), 1e5
@@ -136,6 +143,7 @@ MODELS = {
 
 @pytest.mark.parametrize("name", MODELS)
 @pytest.mark.parametrize("size", [0.0, 1.0, 20.0])
+@pytest.mark.covers("Owis (2.1)-(2.6)", "control/fixed_endpoint_lq.py", "control/asre.py")
 def test_a_converged_sequence_solves_the_nonlinear_equations(name, size):
     """Also from the chief itself, where a factorisation may divide by zero."""
     model, steps = MODELS[name], 40

@@ -71,6 +71,7 @@ def test_every_channel_satisfies_its_bound_at_every_frequency(parameters):
 
 
 @pytest.mark.thorough
+@pytest.mark.covers("Neokleous (5.20), (5.21)", "control/mixed_sensitivity.py")
 def test_the_optimal_gamma_is_that_of_python_control():
     control = pytest.importorskip("control")
     problem = fresh("output").problem
@@ -104,6 +105,7 @@ def test_full_information_attains_its_gamma_for_an_acceleration():
     assert 0.5 * law.optimal_gamma < worst <= law.gamma
 
 
+@pytest.mark.covers("Neokleous (5.6)-(5.9)", "control/mixed_sensitivity.py")
 def test_weighting_functions_have_their_named_asymptotes():
     one = np.ones(3)
     performance = WeightingFunction.performance(0.01 * one, 2.0 * one, 0.03 * one).at(np.array([1e-9, 0.01, 1e6]))[:, 0]
@@ -140,6 +142,7 @@ def test_activation_starts_at_the_force_commanded_before(form, position, velocit
 
 
 @pytest.mark.parametrize("form", LAWS)
+@pytest.mark.covers("Neokleous 6.3, outlook", "control/hinf.py", "control/mpc.py")
 def test_a_large_offset_with_small_thrusters_does_not_wind_up(form, estimate, target):
     # Neokleous 6.2.3: 1 km, 1 N.
     start = [1000.0, 1000.0, 1000.0, 0.0, 0.0, 0.0]

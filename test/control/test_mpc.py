@@ -43,6 +43,7 @@ def test_without_active_constraints_it_is_the_lqr(common, vehicle, estimate, tar
         np.testing.assert_allclose(law.command(estimate(state), target()).force, expected, rtol=0.0, atol=3e-5)
 
 
+@pytest.mark.covers("Kremmydas 2.2", "control/mpc.py")
 def test_weight_matrices_equal_the_corresponding_bryson_weights(common, vehicle, estimate, target):
     matrices = MpcParameters(
         state_weight=tuple(np.diag([0.01] * 3 + [100.0] * 3).ravel()),
@@ -114,6 +115,12 @@ def test_total_thrust_and_thrust_rate_stay_within_their_limits(common, vehicle, 
 
 @pytest.mark.parametrize("replan_interval", [0.0, 1200.0])
 @pytest.mark.thorough
+@pytest.mark.covers(
+    "Kremmydas 4.2.1",
+    "control/mpc.py",
+    "guidance/eclipse_forecast.py",
+    differs="the eclipses of the orbit flown, not a fixed third of every plan",
+)
 def test_there_is_no_thrust_in_predicted_eclipses(replan_interval, common, vehicle, estimate, target):
     # Kremmydas: the last third of every orbit.
     law = make(common, vehicle, off_in_eclipse=True, horizon=50, replan_interval=replan_interval)
@@ -178,6 +185,9 @@ def test_the_longest_eclipse_agrees_with_known_orbits():
     assert longest_eclipse(Orbit(1e7, eccentricity=0.3)) > longest_eclipse(Orbit(1e7))
 
 
+@pytest.mark.covers(
+    "Kremmydas 2.4", "control/mpc.py", differs="online only: he rejects explicit MPC himself, for its memory"
+)
 def test_one_plan_is_applied_over_the_replan_interval(common, vehicle, estimate, target):
     law = make(common, vehicle, replan_interval=600.0)
     _, forces, commands = simulate(law, HillModel(common.mean_motion), estimate, target, OFFSET, 180)
@@ -205,6 +215,7 @@ def netsat(weight):
 
 
 @pytest.mark.parametrize(("weight", "lower", "upper"), [(1.7, 10.0, 400.0), (17.0, 0.0, 1.0)])
+@pytest.mark.covers("Kremmydas 4.3.1; Listing: netSATmpc: the MPC object", "control/mpc.py")
 def test_kremmydas_multistep_mpc_converges_to_a_moving_target(weight, lower, upper, estimate, target):
     model, rate = HillModel(NETSAT.mean_motion), NETSAT.mean_motion
     law = ModelPredictiveController(netsat(weight), NETSAT, Vehicle(1.5, np.full(3, 8e-6)))
@@ -226,6 +237,7 @@ def test_kremmydas_multistep_mpc_converges_to_a_moving_target(weight, lower, upp
     assert lower < max(errors[-25:]) < upper
 
 
+@pytest.mark.covers("Kremmydas 2.1, cost", "control/mpc.py")
 def test_the_absolute_cost_needs_less_delta_v(common, vehicle, estimate, target):
     used = {}
     for cost in ("quadratic", "absolute"):

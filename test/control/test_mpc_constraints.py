@@ -58,6 +58,7 @@ def test_the_total_thrust_polyhedron_lies_inside_the_sphere(point):
 
 @settings(deadline=None)
 @given(hnp.arrays(float, 3, elements=st.floats(-1.0, 1.0)))
+@pytest.mark.covers("Kremmydas 2.1, constraint", "control/mpc_constraints.py")
 def test_box_and_polyhedron_bound_the_magnitude_of_the_force(inputs, force):
     total = TotalThrust(0.008, UNIT, 1)
     box = ThrustBox(np.full(3, total.distance), 1, STEP, TICK, off_in_eclipse=False)

@@ -107,6 +107,7 @@ def test_a_model_without_j2_leaves_a_larger_terminal_error(eccentric, estimate, 
     assert misses[1] < 0.02
 
 
+@pytest.mark.covers("Joshi (6.12)-(6.27)", "control/static_programming.py")
 def test_the_terminal_error_of_euler_is_first_order_in_the_step(eccentric, estimate, target):
     misses = []
     for prediction, step in (("euler", 50.0), ("euler", 10.0), ("rk4", 50.0)):

@@ -21,6 +21,9 @@ HILL = HillModel(0.001083)
 Q, R = np.diag([1.0, 1.0, 1.0, 1e4, 1e4, 1e4]), 1e8 * np.eye(3)
 
 
+@pytest.mark.covers(
+    "Neokleous (4.33)", "control/riccati.py", differs="the printed eigenvalues are those of R = I, not of 100 I"
+)
 def test_the_eigenvalues_are_those_printed_by_neokleous():
     # In minutes, sampled every 0.1 min. Printed for R = 100 I, they belong to R = I.
     phi, gamma = HillModel(7.2921e-5 * 60.0).discretise(0.0, 0.1)
@@ -37,6 +40,7 @@ def test_the_eigenvalues_are_those_printed_by_neokleous():
     thrust=st.floats(-6.0, -3.0),
     tick=st.floats(0.0, 2.0),
 )
+@pytest.mark.covers("Neokleous (4.26)-(4.32)", "control/riccati.py")
 def test_doubling_agrees_with_the_eigenvalue_method(position, velocity, thrust, tick):
     q = np.diag(np.repeat([10.0**-position, 10.0**-velocity], 3) ** 2)
     r = np.eye(3) * 10.0 ** (-2.0 * thrust)
@@ -64,6 +68,7 @@ def test_the_cost_to_go_is_the_cost_of_the_closed_loop():
     assert paid == pytest.approx(weights.cost_unit * scaled @ cost_to_go @ scaled, rel=1e-9)
 
 
+@pytest.mark.covers("Neokleous (4.21)-(4.25)", "control/riccati.py")
 def test_repeated_steps_equal_the_step_by_step_recursion():
     phi, gamma = HILL.discretise(0.0, 20.0)
     one = Weights.scaled(Q, R, 20.0).map(phi, gamma)
@@ -73,6 +78,7 @@ def test_repeated_steps_equal_the_step_by_step_recursion():
     np.testing.assert_allclose(one.repeated(37).backward(np.eye(6)), cost_to_go, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.covers("Roberts (38)-(40)", "control/riccati.py", "control/lqr.py")
 def test_the_continuous_gain_is_the_limit_of_short_ticks():
     continuous = continuous_gain(HILL.dynamics(), HILL.INPUT, Weights.scaled(Q, R, 1.0))
     tick = 1e-3
@@ -82,6 +88,7 @@ def test_the_continuous_gain_is_the_limit_of_short_ticks():
     np.testing.assert_allclose(discrete, continuous, rtol=0.0, atol=1e-4 * np.abs(continuous).max())
 
 
+@pytest.mark.covers("Neokleous (4.5)-(4.20)", "control/riccati.py")
 def test_finite_gains_minimise_the_cost_over_all_thrust_histories():
     steps, tick = 12, 120.0
     phi, gamma = HILL.discretise(0.0, tick)

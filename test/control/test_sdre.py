@@ -85,6 +85,7 @@ def test_sdre_acquires_and_holds_a_distant_free_orbit(estimate, target):
 
 
 @pytest.mark.thorough
+@pytest.mark.covers("Joshi (5.1)-(5.7)", "control/sdre.py")
 def test_the_integral_removes_the_offset_of_a_constant_force(estimate, target):
     common = CommonParameters(Orbit(1e7, 0.0), tick=10.0)
     chief = dataclasses.replace(CHIEF, eccentricity=0.0)

@@ -84,6 +84,9 @@ def test_the_integration_step_has_its_order_and_exact_sensitivities(order):
         np.testing.assert_allclose(slopes[:, column], slope, rtol=0.0, atol=1e-6 * np.abs(slope).max())
 
 
+@pytest.mark.covers(
+    "Joshi (7.1)-(7.23)", "control/static_programming.py", "control/gmpsp.py", differs="of the outputs h(X) = X alone"
+)
 def test_both_methods_converge_to_one_optimum_as_steps_shrink():
     """The excess cost of held thrust is of second order in the step."""
     continuous = effort(gmpsp(task(200), TOLERANCE))
@@ -92,6 +95,9 @@ def test_both_methods_converge_to_one_optimum_as_steps_shrink():
     assert excess[0] / excess[1] == pytest.approx(4.0, rel=0.05)
 
 
+@pytest.mark.covers(
+    "Joshi (6.1)-(6.11)", "control/static_programming.py", "control/mpsp.py", differs="of the outputs h(X) = X alone"
+)
 def test_a_converged_history_is_stationary():
     """First-order optimality: no component in the null space of the sensitivities."""
     plan = mpsp(task(50), TOLERANCE)

@@ -39,6 +39,7 @@ def least_by_search(costs: Array) -> float:
 
 
 @given(cost_tables)
+@pytest.mark.covers("Kremmydas 3.4, configuration", "guidance/assignment.py")
 def test_no_other_assignment_has_a_lower_cost(costs: Array) -> None:
     slots = assign(costs)
     assert len(set(slots)) == len(slots)
@@ -67,6 +68,7 @@ def test_fleet_in_formation_is_assigned_its_own_slots_and_phase(phase: float, or
 @settings(max_examples=10)
 @given(st.integers(0, 10_000))
 @pytest.mark.thorough
+@pytest.mark.covers("Kremmydas 3.4, phase", "guidance/assignment.py")
 def test_free_phase_costs_no_more_than_the_best_of_a_fine_grid(seed: int) -> None:
     states = np.random.default_rng(seed).normal(0.0, 300.0, (4, 6)) * np.repeat([1.0, RATE], 3)
     costs = transfer_costs(states, lambda at: slot_states("tetrahedral", at), 2.0 * ORBIT, RATE)
@@ -78,6 +80,7 @@ def test_free_phase_costs_no_more_than_the_best_of_a_fine_grid(seed: int) -> Non
     )  # only the best of 72 phases is refined: another minimum may be a little lower
 
 
+@pytest.mark.covers("Kremmydas 3.4, importance", "guidance/assignment.py")
 def test_satellite_with_little_propellant_gets_the_lower_cost() -> None:
     # the least sum is 1 + 4, but the second has a tenth of the propellant
     costs = np.array([[1.0, 3.0], [2.5, 4.0]])

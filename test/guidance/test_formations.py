@@ -55,6 +55,7 @@ def size(formation: Formation[Any], *at: float) -> float:
 
 
 @given(formations, times, st.floats(1.0, 6000.0))
+@pytest.mark.covers("Kremmydas 3.2, force-free formation", "guidance/formation.py")
 def test_formation_is_a_free_solution_of_hills_equations(
     formation: Formation[Any], start: float, duration: float
 ) -> None:
@@ -84,6 +85,7 @@ def test_relative_orbit_drifts_by_three_pi_radial_offsets_an_orbit(
     assert last[:3] - first[:3] == pytest.approx(drift, abs=1e-10 * size(formation, 100.0))
 
 
+@pytest.mark.covers("Joshi Fig. 3.4", "guidance/relative_orbit.py", differs="a drawing: its ellipse is ours")
 def test_relative_orbit_is_a_two_to_one_ellipse_in_a_tilted_plane() -> None:
     parameters = RelativeOrbitParameters(rho=500.0, theta=0.3, b=-200.0, m=0.4, n=-0.7)
     x, y, z, *_ = RelativeOrbit(parameters, OMEGA).states(np.linspace(0.0, ORBIT, 50)).T
@@ -98,6 +100,7 @@ def test_relative_orbit_of_slope_two_projects_to_a_circle() -> None:
 
 
 @given(metres, st.lists(times, max_size=5))
+@pytest.mark.covers("Kremmydas 3.2, along the orbit", "guidance/leader_follower.py")
 def test_follower_is_at_rest_behind_the_chief(separation: float, at: list[float]) -> None:
     states = LeaderFollower(LeaderFollowerParameters(separation), OMEGA).states(np.array(at))
     assert states.tolist() == [[0.0, -separation, 0.0, 0.0, 0.0, 0.0]] * len(at)

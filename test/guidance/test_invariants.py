@@ -44,6 +44,7 @@ def rings(name: str, size: float, satellites: int) -> Array:
 
 
 @given(sizes, counts)
+@pytest.mark.covers("Kremmydas Listing: cw_pco", "guidance/projected_circular_orbit.py")
 def test_projected_circular_orbit_projects_to_a_circle(size: float, satellites: int) -> None:
     states = rings("projected_circular_orbit", size, satellites)
     constant(np.hypot(states[..., 1], states[..., 2]), size)
@@ -56,6 +57,11 @@ def test_circular_orbit_has_a_constant_distance_to_the_chief(name: str, size: fl
 
 
 @given(sizes, st.integers(2, 7))
+@pytest.mark.covers(
+    "Kremmydas (4.3); Listing: equidistant; Fig. 4.2",
+    "guidance/equidistant.py",
+    differs="(4.3) has the wrong sign of z'0; distances are constant, not equal; of the picture only this is left",
+)
 def test_equidistant_satellites_are_a_rigid_regular_polygon(size: float, satellites: int) -> None:
     positions = rings("equidistant", size, satellites)[..., :3]
     for one, other in itertools.combinations(range(satellites), 2):
@@ -70,12 +76,18 @@ def test_circular_orbits_lie_in_the_two_planes_of_hills_equations() -> None:
 
 
 @given(sizes, counts)
+@pytest.mark.covers("Kremmydas Listing: cw_helix", "guidance/helix.py")
 def test_helix_keeps_half_its_size_from_the_chiefs_track(size: float, satellites: int) -> None:
     states = rings("helix", size, satellites)
     constant(np.hypot(states[..., 0], states[..., 2]), size / 2.0)
 
 
 @given(sizes, sizes)
+@pytest.mark.covers(
+    "Kremmydas (4.1), (4.2); Listing: cw_plane_1out; Fig. 4.1",
+    "guidance/three_in_plane_one_out.py",
+    differs="(4.1) has the wrong sign of z'0; the code's 0.8 m/s across give 768 m; of the picture only this is left",
+)
 def test_three_in_plane_have_a_constant_area_and_one_oscillates(size: float, height: float) -> None:
     states = fleet("three_in_plane_one_out", 4, size=size, height=height)
     (x, y, z), out = states[:3, :, :3].transpose(2, 0, 1), states[3]
@@ -95,6 +107,11 @@ def volume(positions: Array) -> Array:
 
 
 @given(sizes)
+@pytest.mark.covers(
+    "Kremmydas (4.4)-(4.6); Listing: tetrahedral; Fig. 4.3",
+    "guidance/tetrahedral.py",
+    differs="y0 of the listing: by (4.4), (4.5) the volume is not constant; of the picture only this is left",
+)
 def test_tetrahedron_has_a_constant_volume(size: float) -> None:
     scale = 3.0 * math.sqrt(3.0) / 20.0 * size
     volumes = volume(fleet("tetrahedral", 4, size=size)[..., :3])
@@ -105,6 +122,7 @@ def test_tetrahedron_has_a_constant_volume(size: float) -> None:
 
 
 @given(sizes, st.floats(-1e4, 1e4), st.floats(-3.0, 3.0), st.integers(1, 8))
+@pytest.mark.covers("Kremmydas Listing: cw_moving_plane", "guidance/moving_plane.py")
 def test_moving_plane_has_all_satellites_on_one_line(size: float, height: float, slope: float, satellites: int) -> None:
     states = fleet("moving_plane", satellites, size=size, height=height, slope=slope)
     x, y, z, *_ = states.transpose(2, 0, 1)
@@ -156,6 +174,7 @@ def test_every_slot_of_every_formation_is_in_free_motion(name: str) -> None:
 
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=6, max_size=6), st.floats(0.0, 6000.0))
+@pytest.mark.covers("Kremmydas 1.1.2; 4.1", "guidance/formation.py", "relative/hill.py")
 def test_conversion_from_lvlh_turns_kremmydas_equations_into_hills(numbers: list[float], time: float) -> None:
     # his matrix of 4.1, as printed: x'' = 2 w z', y'' = -w^2 y, z'' = -2 w x' + 3 w^2 z
     matrix = np.zeros((6, 6))

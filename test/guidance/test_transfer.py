@@ -19,6 +19,7 @@ errors = st.lists(st.floats(-500.0, 500.0), min_size=6, max_size=6).map(
 
 @given(st.floats(0.01, 1.0))
 @pytest.mark.thorough
+@pytest.mark.covers("Kremmydas 3.1.1", "guidance/transfer.py")
 def test_short_cross_track_transfer_takes_the_bang_bang_time(distance: float) -> None:
     # 2 sqrt(d / a): accelerate half the way, brake the other half; the orbit is negligible over such times
     soonest = shortest_time(np.array([0.0, 0.0, distance, 0.0, 0.0, 0.0]), np.full(3, 1e-2), RATE)

@@ -27,6 +27,7 @@ def readings(sensors: tuple[str, ...], offset: float = 0.0) -> Readings:
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
+@pytest.mark.covers("Neokleous (3.4)-(3.11)", "navigation/filters.py", "navigation/navigation_filter.py")
 def test_extended_update_has_the_bits_of_filterpy(count: int) -> None:
     spread = np.random.default_rng(count).standard_normal((6, 9))
     covariance = spread @ spread.T

@@ -165,6 +165,11 @@ def test_selected_readings_keep_their_values_ages_and_variances() -> None:
 
 
 @given(chiefs, relatives)
+@pytest.mark.covers(
+    "Neokleous (3.12), (3.13)",
+    "navigation/pseudo_measurements.py",
+    differs="y(2) is half the rate of r², y(3) is z only about an equatorial chief",
+)
 def test_pseudo_measurements_are_those_of_neokleous(chief: Vector, relative: Vector) -> None:
     """(3.13), (3.18): functions of the relative state about a circular equatorial chief; exact in general
     as below."""

@@ -19,6 +19,7 @@ def test_names_that_scenarios_give_are_offered():
 
 
 @pytest.mark.parametrize("name", PROCESS_MODELS)
+@pytest.mark.covers("Neokleous (3.1)-(3.3)", "navigation/process.py")
 def test_every_process_model_predicts_a_near_circular_orbit(name: str):
     chief = state_from_elements(COMMON.chief_elements)
     deputy, thrust = inertial_from_relative(chief, STATE), THRUST @ hill_rotation(chief)

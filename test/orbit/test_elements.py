@@ -37,6 +37,11 @@ def orbits(draw):
 @example(Elements(7e6, 0.0, pi, 1.0, 2.0, 3.0))
 @example(Elements(8e6, 0.1, pi, 1.0, 2.0, 3.0))
 @example(Elements(7e6, 0.0, 1.0, 1.0, 2.0, 3.0))
+@pytest.mark.covers(
+    "Kremmydas 1.1.1",
+    "orbit/elements.py",
+    differs="the root of a negative number in the rate of f, and b/a for the eccentricity",
+)
 def test_state_to_elements_and_back_is_the_same_state(elements):
     state = state_from_elements(elements)
     again = state_from_elements(elements_from_state(state))
@@ -85,6 +90,7 @@ def test_singular_orbits_follow_the_convention(state, expected):
     ) == pytest.approx(expected, abs=1e-14)
 
 
+@pytest.mark.covers("Joshi Fig. 3.5", "orbit/elements.py", differs="a drawing: its elements are ours")
 def test_vallado_example_of_state_to_elements():
     """Vallado, Fundamentals of Astrodynamics, example 2-5 (his gravity, his digits).
 

@@ -54,6 +54,7 @@ def zonal_potential(degree):
 
 @COMPILES
 @given(st.integers(2, 6), RADIUS, SINE, LONGITUDE)
+@pytest.mark.covers("Neokleous (2.1)-(2.6)", "orbit/forces/zonal.py", differs="(2.6) is (3 sin² λ − 1)/2")
 def test_zonal_acceleration_is_the_gradient_of_its_potential(degree, radius, sine, longitude):
     position = point(radius, sine, longitude)
     ours = np.array(zonal.acceleration(degree, *position)) - np.array(zonal.acceleration(0, *position))
@@ -62,6 +63,12 @@ def test_zonal_acceleration_is_the_gradient_of_its_potential(degree, radius, sin
     assert np.abs(ours - numerical_gradient(zonal_potential(degree), position)).max() < 2e-14 * scale
 
 
+@pytest.mark.covers("Joshi (3.1)-(3.15)", "orbit/gravity.py")
+@pytest.mark.covers(
+    "Neokleous (1.1)-(1.3)",
+    "orbit/gravity.py",
+    differs="in Cartesian coordinates; (1.3) leaves the along-track force out",
+)
 def test_central_attraction_is_inverse_square():
     position = point(7e6, 0.3, 1.0)
     expected = -MU * position / 7e6**3
@@ -82,6 +89,9 @@ def test_zonal_recursion_equals_the_closed_form_of_j2(radius, sine, longitude):
 
 @COMPILES
 @given(st.floats(0.0, pi), st.floats(0.0, tau), st.floats(0.0, 0.3))
+@pytest.mark.covers(
+    "Neokleous (2.14)-(2.17)", "orbit/forces/zonal.py", differs="(2.15) lacks cos i in z, (2.17) has its signs turned"
+)
 def test_j2_along_an_orbit_in_hill_components(inclination, anomaly, eccentricity):
     """Joshi (3.46), with i the inclination and u the argument of latitude."""
     state = state_from_elements(Elements(8e6 / (1 - eccentricity), eccentricity, inclination, 0.4, 0.5, anomaly))
@@ -159,6 +169,7 @@ def test_tidal_accelerations_have_their_textbook_size():
         assert tide @ across == pytest.approx(-mu * 42.164e6 / distance**3, rel=0.05)
 
 
+@pytest.mark.covers("Neokleous (2.7)-(2.10)", "orbit/forces/third_body.py")
 def test_third_body_vanishes_at_the_earths_centre():
     assert np.array(third_body.acceleration(third_body.MU_MOON, *moon(0.0), 0.0, 0.0, 0.0)) == pytest.approx(0.0)
 
@@ -244,6 +255,9 @@ class TestShadow:
         assert minutes == pytest.approx(71.5, abs=1.0)
 
 
+@pytest.mark.covers(
+    "Neokleous (2.11)-(2.13)", "orbit/forces/radiation.py", differs="(2.11) is in kW, and C_p lies between 1 and 2"
+)
 def test_radiation_pressure_is_the_solar_constant_over_c():
     ahead = np.array([ASTRONOMICAL_UNIT, 0.0, 0.0])
     push = np.array(radiation.acceleration(0.02, *ahead, 0.0, 0.0, 7e6))

@@ -37,6 +37,7 @@ RELATIVE = st.tuples(*[st.floats(-1e5, 1e5)] * 3, *[st.floats(-100, 100)] * 3).m
 
 
 @given(chiefs(), RELATIVE)
+@pytest.mark.covers("Joshi (3.16)", "orbit/frames.py")
 def test_relative_state_to_inertial_and_back_is_the_same_state(chief, relative):
     again = relative_from_inertial(chief, inertial_from_relative(chief, relative))
     # A few parts in 1e16 of the orbit's radius, up to 4e7 m, and speed.
@@ -52,6 +53,7 @@ def test_transform_matrix_equals_the_exact_map(chief, relative):
 
 
 @given(chiefs())
+@pytest.mark.covers("Joshi Fig. 3.2; Fig. 3.3", "orbit/frames.py", differs="a drawing: its axes are ours")
 def test_hill_axes_are_radial_along_track_and_normal(chief):
     rotation = hill_rotation(chief)
     assert rotation @ rotation.T == pytest.approx(np.eye(3), abs=1e-14)
@@ -64,6 +66,12 @@ def test_hill_axes_are_radial_along_track_and_normal(chief):
     assert hill_rate(chief) == pytest.approx(velocity[1] / radius)
 
 
+@pytest.mark.covers(
+    "Kremmydas Fig. 1.8",
+    "orbit/frames.py",
+    "guidance/formation.py",
+    differs="a drawing: ESA's axes, turned into Hill's",
+)
 def test_relative_velocity_is_the_derivative_of_relative_position():
     """Without forces out of its plane the frame turns at h/r^2 alone: checked on the conic itself."""
     eccentricity, axis = 0.3, 1e7

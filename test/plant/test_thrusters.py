@@ -121,6 +121,7 @@ def test_noise_does_not_depend_on_whether_thrust_was_denied():
     assert np.array_equal(one.apply(command, False, state)[0], other.apply(command, False, state)[0])
 
 
+@pytest.mark.covers("Neokleous (2.28)", "plant/thrusters.py")
 def test_propellant_follows_the_rocket_equation():
     one = thruster(specific_impulse=200.0, dry_mass=50.0)
     state, speed = one.start(100.0), 0.0

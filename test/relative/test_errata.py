@@ -43,6 +43,12 @@ def inertial_difference(state, chief, control=(0.0, 0.0, 0.0)):
     return attraction + np.array(control) - turning
 
 
+@pytest.mark.covers(
+    "Joshi (3.17)-(3.26)",
+    "relative/nonlinear.py",
+    "relative/chief.py",
+    differs="(3.21) has the sign of the control wrong, (3.22) the Coriolis term of y",
+)
 def test_joshi_3_21_control_enters_with_the_other_sign():
     control = np.array([1e-3, 2e-3, -1e-3])
     acceleration = NonlinearModel(CHIEF).derivative(300.0, STATE, control)[3:]
@@ -85,6 +91,11 @@ def printed_components(state, doubled):
     return np.array(j) / np.linalg.norm(state[:3]) ** 4
 
 
+@pytest.mark.covers(
+    "Joshi (3.38)-(3.48)",
+    "relative/oblate.py",
+    differs="(3.39)-(3.44) have misprinted denominators, (3.48) the wrong sign, and J_y, J_z half of what (3.46) has",
+)
 def test_joshi_3_48_sign_and_the_factor_two():
     # Where the sign and the factors matter alone: the acceleration of one satellite in its own axes (3.46).
     _, chief, _ = differential_oblateness(ORBIT, STATE)
@@ -109,6 +120,7 @@ def test_joshi_3_48_neglects_the_rotation_between_the_two_axes():
     np.testing.assert_allclose(exact, differential_oblateness(ORBIT, STATE)[0], rtol=1e-9)
 
 
+@pytest.mark.covers("Joshi (4.14)-(4.19)", "guidance/relative_orbit.py", differs="(4.17) lacks ω")
 def test_joshi_4_17_lacks_the_rate():
     rho, theta, w, m, n, a, b = 1e3, 0.7, 1e-3, 1.0, 0.5, 0.0, 20.0
 
@@ -133,6 +145,9 @@ def test_joshi_4_17_lacks_the_rate():
     np.testing.assert_allclose(HillModel(w).propagate(0.0, start, 900.0)[:3], later[:3], atol=1e-4)
 
 
+@pytest.mark.covers(
+    "Joshi (5.17)-(5.27)", "relative/factorisation.py", differs="A21, A23, A25 and A66 of (5.26) are misprinted"
+)
 def test_joshi_5_26_entries_of_the_factorisation():
     x, y, z = STATE[:3]
     r, w, a = HERE.radius, HERE.angular_rate, HERE.angular_acceleration
@@ -177,6 +192,11 @@ def test_joshi_5_37_expansion_of_the_fourth_power():
 
 
 @pytest.mark.parametrize("angle", [2.0, 3.0, 5.0])
+@pytest.mark.covers(
+    "Joshi (5.34)-(5.55)",
+    "relative/factorisation.py",
+    differs="an exact factorisation in place of series that fail beyond 2 rad, and signs",
+)
 def test_joshi_5_45_truncated_series_fails_beyond_two_radians(angle):
     series = angle - angle**3 / 6 + angle**5 / 120
     assert abs(series - math.sin(angle)) > 0.02  # of a sine of one, at arguments of latitude up to 2 pi
@@ -239,6 +259,11 @@ def test_joshi_5_53_zetas():
     assert (two[0] + two[2]) * di + (two[1] + two[3]) * du != approx(truth, rel=0.1)  # printed
 
 
+@pytest.mark.covers(
+    "Joshi (6.28)-(6.40)",
+    "relative/nonlinear.py",
+    differs="powers of γ for powers of d, and signs in (6.33), (6.35), (6.36), (6.40)",
+)
 def test_joshi_6_28_to_6_40_jacobian():
     x, y, z = STATE[:3]
     r, w, a = HERE.radius, HERE.angular_rate, HERE.angular_acceleration
@@ -270,6 +295,7 @@ def test_joshi_6_28_to_6_40_jacobian():
     assert a + 3 * MU * gamma**-2.5 * y * (r + x) != approx(exact[3, 1], rel=1e-2)
 
 
+@pytest.mark.covers("Joshi (6.41)-(6.46)", "relative/oblate.py", differs="the derivative of d⁻⁴ and the sign of (3.54)")
 def test_joshi_6_41_derivative_of_the_fourth_power():
     r, (x, y, z) = HERE.radius, STATE[:3]
 
@@ -287,6 +313,7 @@ def test_joshi_table_8_2_perigee_is_inside_the_earth():
     assert KeplerChief(11114.5e3, 0.5).at(0.0).radius < EARTH_RADIUS  # accepted all the same
 
 
+@pytest.mark.covers("Roberts (37)", "relative/j2_gradient.py", differs="the Coriolis term has ω' for ω")
 def test_roberts_37_coriolis_term_is_in_the_rate():
     # The reference turns at a constant rate, so that the printed term would vanish and with it the coupling
     # of x and y by which (24) has 2 n c.
@@ -294,6 +321,11 @@ def test_roberts_37_coriolis_term_is_in_the_rate():
     assert model.dynamics()[3, 4] == approx(2.0 * model.reference.rate)
 
 
+@pytest.mark.covers(
+    "Kremmydas 1.1.4, Tschauner-Hempel",
+    "relative/tschauner_hempel.py",
+    differs="terms are lost in x, z and the rate's rate",
+)
 def test_kremmydas_tschauner_hempel_equations():
     # ESA axes: x along-track, y against the normal, z to Earth.
     turn = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
@@ -311,6 +343,11 @@ def test_kremmydas_tschauner_hempel_equations():
     assert -2 * n**2 * e * math.sin(nu + e * math.cos(nu)) ** 3 / (1 - e**2) ** 3 != approx(a, rel=0.1)
 
 
+@pytest.mark.covers(
+    "Kremmydas 1.1.3, matrices; 4.1",
+    "relative/hill.py",
+    differs="the printed matrices are those of 1.0618e-3 rad/s, not of the rates beside them (0.0011 and 1.127e-6)",
+)
 def test_kremmydas_rate_behind_the_printed_matrices():
     printed = {
         (0, 2): 0.03,
@@ -374,6 +411,11 @@ def test_kremmydas_4_4_tetrahedron_volume_needs_the_codes_signs(first, second, c
     assert bool(np.ptp(volumes) < 1e-9 * max(volumes)) == constant
 
 
+@pytest.mark.covers(
+    "Neokleous (1.4)-(1.6)",
+    "relative/nonlinear.py",
+    differs="(1.4) has the sign of ρ wrong, (1.6) the power on the numerator too, and the numerator of z",
+)
 def test_neokleous_1_6_power_and_numerator():
     r, (x, y, z) = HERE.radius, STATE[:3]
     d2 = (r + x) ** 2 + y**2 + z**2
@@ -391,6 +433,7 @@ def test_neokleous_1_4_separation_is_the_satellite_less_the_point():
     assert tidal > 0.0
 
 
+@pytest.mark.covers("Neokleous (1.7)-(1.11)", "relative/tschauner_hempel.py")
 def test_neokleous_1_11_is_correct():
     r, w, a = HERE.radius, HERE.angular_rate, HERE.angular_acceleration
     k = MU / r**3
@@ -398,6 +441,9 @@ def test_neokleous_1_11_is_correct():
     np.testing.assert_allclose(jacobian(np.zeros(6), HERE)[3:, :3], printed, rtol=1e-12, atol=1e-22)
 
 
+@pytest.mark.covers(
+    "Neokleous (2.18)", "relative/schweighart_sedwick.py", differs="c has no μ, and stands in the second row too"
+)
 def test_neokleous_2_18_c_is_without_mu_and_in_both_rows():
     reference = CircularReference(42164e3, 0.0)
     c2 = 1 + 3 * J2 * EARTH_RADIUS**2 / (8 * reference.radius**2) * (1 + 3 * math.cos(2 * reference.inclination))
@@ -422,6 +468,11 @@ def test_neokleous_3_13_second_measurement_is_the_firsts_derivative():
     assert 0.5 * square(state) != approx(rate, rel=1e3)  # printed: (1/2) r2^2
 
 
+@pytest.mark.covers(
+    "Neokleous (3.14)-(3.19); (3.20)-(3.23)",
+    "navigation/process.py",
+    differs="(3.20) has a stray T and lacks c, (3.21) is 6 × 3 with T; ours is discretised exactly",
+)
 def test_neokleous_3_20_matrix_is_the_euler_step():
     model = SchweighartSedwickModel(CircularReference(42164e3, 0.0))
     order = [0, 3, 1, 4, 2, 5]  # x, x', y, y', z, z'
@@ -433,6 +484,9 @@ def test_neokleous_3_20_matrix_is_the_euler_step():
     assert inputs[1, 0] == inputs[3, 1] == inputs[5, 2] == 6.0
 
 
+@pytest.mark.covers(
+    "Owis (3.6)-(3.8); (3.1)-(3.5)", differs="(3.7) is no factorisation of (3.2) as printed: A43 = −2 x4/x1"
+)
 def test_owis_3_7_factorisation():
     r, theta, rate_r, rate = 1.1, 0.8, 0.05, 0.9
     state = np.array([r, theta, rate_r, rate])
@@ -444,11 +498,15 @@ def test_owis_3_7_factorisation():
     assert abs((printed @ state - truth)[3]) > 10 * abs(truth[3])
 
 
+@pytest.mark.covers("Owis 4, first transfer", differs="the final rate of r = 1.2 is 0.7607, not 0.54433")
 def test_owis_final_rate_belongs_to_another_radius():
     assert approx(0.7607, abs=1e-4) == 1.2**-1.5
     assert approx(0.54433105395, abs=1e-11) == 1.5**-1.5  # printed for r = 1.2
 
 
+@pytest.mark.covers(
+    "Joshi (8.6)-(8.8)", "control/networks.py", differs="(8.8) is no solution of (8.6) by its dimensions"
+)
 def test_joshi_8_8_weights_minimise_the_cost_of_8_6():
     rng = np.random.default_rng(3)
     phi, target, before, r1 = rng.normal(size=4), 0.7, rng.normal(size=4), 0.3
@@ -464,6 +522,12 @@ def test_joshi_8_8_weights_minimise_the_cost_of_8_6():
     assert not np.allclose(printed, best, atol=0.05)
 
 
+@pytest.mark.covers(
+    "Joshi (5.8)-(5.16)",
+    "control/sdre_finite.py",
+    "control/fixed_endpoint_lq.py",
+    differs="(5.11), (5.12) have Q for −Q, and the transition matrix from t₀ where that to go is needed",
+)
 def test_joshi_5_11_lower_left_block_is_minus_q():
     # Along the Hamiltonian flow the costate must be the gradient of the cost: lambda = P x of the Riccati
     # equation is an invariant subspace of H with -Q, and not with +Q.

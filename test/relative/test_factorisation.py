@@ -103,6 +103,11 @@ def test_on_the_chief_the_factorisation_is_the_jacobian(chief, time):
     np.testing.assert_allclose(oblateness(still, here), oblate_gradient(still, here), rtol=1e-9, atol=1e-19)
 
 
+@pytest.mark.covers(
+    "Joshi (5.28)-(5.33)",
+    "relative/factorisation.py",
+    differs="(5.31), (5.32) divide by x: the numerator is spread over the axes",
+)
 def test_sdc2_is_regular_at_zero_radial_separation():
     # The printed sigma_x = (r / x + 1) sigma_y grows without bound as x goes to 0 at y = 25 km.
     chief = KeplerChief(1e7).at(0.0)
@@ -114,6 +119,7 @@ def test_sdc2_is_regular_at_zero_radial_separation():
 
 
 @given(chiefs, times)
+@pytest.mark.covers("Joshi (3.27)-(3.37)", "relative/hill.py")
 def test_sdc1_and_sdc2_near_a_circular_chief_are_hills_equations(chief, time):
     circular = KeplerChief(chief.semi_major_axis).at(time)
     w = circular.angular_rate

@@ -42,6 +42,12 @@ def inertial_of(values):
 
 
 @given(orbits)
+@pytest.mark.covers(
+    "Joshi (3.49)-(3.56)",
+    "relative/element_differences.py",
+    "relative/gim_alfriend.py",
+    differs="(3.54) has the wrong sign",
+)
 def test_sigma_is_the_derivative_of_the_relative_state(elements):
     e, omega = elements.eccentricity, elements.argument_of_perigee
     values = np.array(

@@ -15,6 +15,7 @@ durations = st.floats(-2e4, 2e4)
 
 
 @given(motions, st.floats(-25.0, 25.0), st.floats(-1e4, 1e4))
+@pytest.mark.covers("Roberts (9)", "relative/hill.py")
 def test_discretisation_is_the_matrix_exponential(mean_motion, angle, later):
     # Compared in units of 1 / n, where all entries are of one size.
     joint = np.zeros((9, 9))
@@ -71,6 +72,7 @@ def test_bounded_motion_closes_after_one_orbit(mean_motion, numbers):
     assert state[3] == numbers[3] * mean_motion
 
 
+@pytest.mark.covers("Kremmydas 1.1.3, closed form; Listing: FreeDriftFormations: free drift", "relative/hill.py")
 def test_closed_form_under_constant_thrust_is_the_printed_one():
     # Kremmydas section 1.1.3, in its axes: x along-track, y against the normal, z to Earth.
     omega, t = 1.0618e-3, 2345.0
@@ -96,6 +98,7 @@ def test_arrays_of_durations_and_states_give_single_results():
         np.testing.assert_array_equal(together[index], model.propagate(0.0, states[index], float(time), thrust))
 
 
+@pytest.mark.covers("Neokleous (1.12), (1.13)", "relative/hill.py")
 def test_integration_of_the_right_hand_side_gives_the_closed_form():
     # The integrator of models without a closed form, in steps of 1/190 orbit.
     model = HillModel(1.1e-3)

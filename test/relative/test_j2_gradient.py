@@ -28,6 +28,7 @@ def test_gradient_is_that_of_j2_in_the_hill_frame(reference, latitude):
 
 
 @given(st.floats(6.6e6, 4.2e7), st.floats(0.0, math.pi), st.floats(0.0, 6.28))
+@pytest.mark.covers("Roberts (10)-(12); (17)-(21)", "relative/j2_gradient.py")
 def test_gradient_is_the_derivative_of_the_acceleration(radius, inclination, latitude):
     # Finite differences of the inertial J2 acceleration, turned into the Hill frame: an independent check.
     state = state_from_elements(Elements(radius, 0.0, inclination, 0.7, 0.0, latitude))

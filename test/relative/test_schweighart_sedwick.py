@@ -33,6 +33,7 @@ def scaled(reference, matrix):
 
 
 @given(references)
+@pytest.mark.covers("Roberts (22)-(24)", "relative/schweighart_sedwick.py")
 def test_dynamics_has_the_averaged_gradient(reference):
     n, c2 = reference.mean_motion, 1.0 + reference.averaged
     average = np.zeros((3, 3))
@@ -50,6 +51,7 @@ def test_dynamics_has_the_averaged_gradient(reference):
 
 
 @given(references)
+@pytest.mark.covers("Roberts (13)-(16)", "relative/schweighart_sedwick.py")
 def test_averaged_acceleration_is_radial_and_sets_the_orbital_rate(reference):
     # Roberts (13), (15): n^2 c^2 r balances gravity and the averaged J2 acceleration.
     r, i = reference.radius, reference.inclination
@@ -95,6 +97,7 @@ def test_transition_is_a_group_of_unit_determinant(reference, first, second):
 
 
 @given(references, numbers)
+@pytest.mark.covers("Roberts (32)-(34)", "relative/schweighart_sedwick.py")
 def test_centred_state_has_no_drift_and_no_offset(reference, values):
     model = SchweighartSedwickModel(reference)
     unit = np.repeat([1.0, reference.mean_motion], 3)
@@ -113,6 +116,7 @@ def test_centred_state_has_no_drift_and_no_offset(reference, values):
 @settings(max_examples=10)
 @given(st.floats(6.6e6, 4.2e7), st.floats(0.05, math.pi - 0.05), numbers)
 @pytest.mark.thorough
+@pytest.mark.covers("Roberts (1)-(8); (26)-(31)", "relative/schweighart_sedwick.py")
 def test_perturbed_satellite_from_the_equator_stays_by_the_reference(radius, inclination, values):
     # Roberts (28)-(30) and the averaged gradient with the J2 forces of (35) left unaveraged.
     reference = CircularReference(radius, inclination)
@@ -159,6 +163,11 @@ def schweighart_sedwick_constants(reference, state):
     return q, growth
 
 
+@pytest.mark.covers(
+    "Roberts (25)",
+    "relative/schweighart_sedwick.py",
+    differs="l, q and φ are not defined there: those of Schweighart and Sedwick (2002)",
+)
 def test_cross_track_extension_equals_that_of_schweighart_and_sedwick():
     reference = CircularReference(7e6, math.radians(35.0))
     # Starting on the equator with z = -r sin i dO: the nodes of the two planes apart, and the inclinations.
@@ -182,6 +191,7 @@ def test_cross_track_extension_equals_that_of_schweighart_and_sedwick():
 
 @pytest.mark.parametrize("inclination", [35.0, 97.87])
 @pytest.mark.thorough
+@pytest.mark.covers("Kremmydas 1.1.4, Schweighart-Sedwick", "relative/schweighart_sedwick.py")
 def test_cross_track_extension_improves_on_the_average(inclination):
     reference = CircularReference(7e6, math.radians(inclination))
     model = SchweighartSedwickNodalModel(reference)

@@ -13,6 +13,7 @@ from numpy.linalg import LinAlgError
 from numpy.typing import NDArray
 
 from formation_gnc.control.fixed_endpoint_lq import AsreResult, Cost, System, approximating_sequence
+from verification.coverage.marker import covers
 from verification.figure import Figure, save
 from verification.optimum import collocated
 from verification.seeds.accepted import Ours
@@ -166,6 +167,37 @@ def optimum(transfer: Transfer, weight: float) -> float:
     )
     density = weight * np.sum(path[:4] ** 2, axis=0) + path[6] ** 2 + (path[7] / path[0]) ** 2
     return 0.5 * float(np.trapezoid(density, dx=transfer.duration / (10 * STEPS)))
+
+
+covers(
+    "Owis 4, first transfer; 4, second time",
+    "control/fixed_endpoint_lq.py",
+    "control/asre.py",
+    figures=(
+        "Q = I: least J over the optimum",
+        "Q = I: greatest J over the optimum",
+    ),
+    differs="with (3.7) as printed it diverges; corrected it converges; nothing of it is printed but plots",
+)
+covers(
+    "Owis 4, second transfer",
+    "control/fixed_endpoint_lq.py",
+    figures=(
+        "Q = 0: greatest J over the optimum",
+        "(3.7) as printed: transfers that converge",
+    ),
+    differs=("does not converge with Q = I; with Q = 0 and gravity in the column of r it does, at twice the optimum"),
+)
+covers(
+    "Owis Fig. 3; Fig. 4",
+    "control/fixed_endpoint_lq.py",
+    figures=(
+        "Q = I: least J over the optimum",
+        "Q = I: greatest J over the optimum",
+    ),
+    differs="the plot is lost in the text; ours is seeds_owis.png, for each of the three final rates",
+)
+covers("Owis Fig. 2", impossible="a drawing, with nothing to compute")
 
 
 def section(directory: Path) -> tuple[str, list[Figure]]:
