@@ -1,4 +1,4 @@
-"""Accept the figures of the page of the seeds as they come out now, of all its parts or of those named."""
+"""Accept the figures of the pages of the seeds as they come out now, of all parts or of those named."""
 
 import sys
 from pathlib import Path
