@@ -12,6 +12,8 @@ class Omniscient:
     def __init__(self, plant: Plant, name: str) -> None:
         """For a deputy of this plant."""
         self._plant, self._index = plant, plant.parameters.deputies.index(name)
+        self.events: list[Event] = []
+        """None ever."""
 
     def take_events(self) -> list[Event]:
         """Nothing happens to it."""

@@ -4,6 +4,8 @@ Minimum-effort thrust history between two states in a given time, on a nonlinear
 iteration predicts the trajectory under the current history, computes the sensitivities of the terminal state
 to the thrust backwards along it, and updates the history in closed form: least effort that cancels the
 terminal error to first order. At convergence the first-order optimality conditions hold.
+
+What is to be reached is the goal itself, or outputs Y = h(X) of it, fewer than the states or as many.
 """
 
 from collections.abc import Callable
@@ -33,14 +35,23 @@ class StaticPlan(Plan):
     """Decision variables. MPSP: `acceleration` itself. G-MPSP: (2 N + 1, 3) acceleration at the ends and
     middles of N steps; `acceleration` is held over parts of the steps and reaches the same state."""
     errors: Matrix
-    """(iterations + 1, 6) terminal error of the guess and after each iteration."""
+    """(iterations + 1, p) terminal error of the guess and after each iteration: of the state, or of the outputs."""
 
 
 Prediction = tuple[Matrix, Callable[[], Matrix]]
 """Predicted terminal state, and a function for its sensitivities (M, 6, 3) to each acceleration, per second."""
 
+Output = Callable[[Vector], tuple[Vector, Matrix]]
+"""h(X) (p,) of a state (6,), and its derivative (p, 6): Joshi (6.2), (7.2), (7.11)."""
 
-def mpsp(task: Task, tolerance: Vector, max_iterations: int = 20, method: str = "rk4") -> StaticPlan:
+
+def mpsp(
+    task: Task,
+    tolerance: Vector,
+    max_iterations: int = 20,
+    method: str = "rk4",
+    output: Output | None = None,
+) -> StaticPlan:
     """MPSP, Joshi (6.1)-(6.11), from the task's guess or zero thrust.
 
     The sensitivities are the exact derivatives of the integration step, "rk4" or "euler" (6.14). Joshi
@@ -48,9 +59,10 @@ def mpsp(task: Task, tolerance: Vector, max_iterations: int = 20, method: str = 
 
     Args:
         task: its steps are those of the discrete model.
-        tolerance: (6,) admissible terminal error.
+        tolerance: (p,) admissible terminal error.
         max_iterations: bound on the iterations.
         method: key of `STAGES`.
+        output: what of the goal is to be reached; all of it by default.
     """
     guess = np.zeros((task.steps, 3)) if task.guess is None else task.guess
 
@@ -72,11 +84,13 @@ def mpsp(task: Task, tolerance: Vector, max_iterations: int = 20, method: str = 
         return states[-1], sensitivities
 
     shares = np.full(task.steps, task.step)
-    history, errors, failure, _ = _solve(task, guess, predict, shares, tolerance, max_iterations)
+    history, errors, failure, _ = _solve(task, guess, predict, shares, tolerance, max_iterations, output)
     return StaticPlan(history, task.duration, len(errors) - 1, failure, history=history, errors=errors)
 
 
-def gmpsp(task: Task, tolerance: Vector, max_iterations: int = 20, pieces: int = 2) -> StaticPlan:
+def gmpsp(
+    task: Task, tolerance: Vector, max_iterations: int = 20, pieces: int = 2, output: Output | None = None
+) -> StaticPlan:
     """G-MPSP, Joshi (7.1)-(7.23), from the task's guess or zero thrust; arguments as for `mpsp`.
 
     `pieces` is the number of equal parts of a step over which the result is held.
@@ -114,7 +128,7 @@ def gmpsp(task: Task, tolerance: Vector, max_iterations: int = 20, pieces: int =
 
         return states[-1], sensitivities
 
-    history, errors, failure, sensitivity = _solve(task, start, predict, shares, tolerance, max_iterations)
+    history, errors, failure, sensitivity = _solve(task, start, predict, shares, tolerance, max_iterations, output)
     held = history[:-1] if sensitivity is None else _held(task, history, sensitivity, shares, pieces)
     return StaticPlan(held, task.duration, len(errors) - 1, failure, history=history, errors=errors)
 
@@ -128,7 +142,8 @@ def _held(task: Task, history: Matrix, sensitivity: Matrix, shares: Vector, piec
     lengths = np.full(len(held), task.step / pieces)
     reached = np.einsum("k,kij,kj->i", shares, sensitivity, history)
     lost = np.einsum("k,kij,kj->i", lengths, response, held) - reached
-    change = _update(replace(task, slack=np.zeros((6, 6))), response, lengths, np.zeros_like(held), lost)
+    rigid = replace(task, slack=np.zeros((len(lost), len(lost))))
+    change = _update(rigid, response, lengths, np.zeros_like(held), lost)
     return held if change is None else held + change[0]
 
 
@@ -193,19 +208,20 @@ def _solve(
     shares: Vector,
     tolerance: Vector,
     max_iterations: int,
+    output: Output | None,
 ) -> tuple[Matrix, Matrix, str, Matrix | None]:
     """Iterate prediction and update until the terminal error is as expected, or the iteration fails.
 
     At least one update: a guess may reach the goal at far more than the least effort.
 
-    Returns the history, the terminal errors (iterations + 1, 6), the reason of failure, if any, and the
+    Returns the history, the terminal errors (iterations + 1, p), the reason of failure, if any, and the
     sensitivities of the last update, if any.
     """
-    history, expected, errors, sensitivity = guess, np.zeros(6), list[Vector](), None
+    history, expected, errors, sensitivity = guess, np.zeros(len(tolerance)), list[Vector](), None
     with np.errstate(all="ignore"):
         while True:
             end, sensitivities = predict(history)
-            errors.append(end - task.goal)
+            errors.append(end - task.goal if output is None else output(end)[0] - output(task.goal)[0])
             failure = ""
             if not task.duration > 0.0:
                 failure = f"the final time is past by {abs(task.duration):g} s"
@@ -217,8 +233,11 @@ def _solve(
                 miss = np.linalg.norm(errors[-1][:3])
                 failure = f"{max_iterations} iterations leave {miss:.3g} m at the final time"
             else:
-                sensitivity = sensitivities()
-                update = _update(task, sensitivity, shares, history, errors[-1])
+                sensitivity, own = sensitivities(), task
+                if output is not None:
+                    slope = output(end)[1]
+                    sensitivity, own = slope @ sensitivity, replace(task, slack=slope @ task.slack @ slope.T)
+                update = _update(own, sensitivity, shares, history, errors[-1])
                 if update is not None:
                     history, expected = update
                     continue

@@ -84,9 +84,7 @@ def test_the_integration_step_has_its_order_and_exact_sensitivities(order):
         np.testing.assert_allclose(slopes[:, column], slope, rtol=0.0, atol=1e-6 * np.abs(slope).max())
 
 
-@pytest.mark.covers(
-    "Joshi (7.1)-(7.23)", "control/static_programming.py", "control/gmpsp.py", differs="of the outputs h(X) = X alone"
-)
+@pytest.mark.covers("Joshi (7.1)-(7.23)", "control/static_programming.py", "control/gmpsp.py")
 def test_both_methods_converge_to_one_optimum_as_steps_shrink():
     """The excess cost of held thrust is of second order in the step."""
     continuous = effort(gmpsp(task(200), TOLERANCE))
@@ -95,9 +93,7 @@ def test_both_methods_converge_to_one_optimum_as_steps_shrink():
     assert excess[0] / excess[1] == pytest.approx(4.0, rel=0.05)
 
 
-@pytest.mark.covers(
-    "Joshi (6.1)-(6.11)", "control/static_programming.py", "control/mpsp.py", differs="of the outputs h(X) = X alone"
-)
+@pytest.mark.covers("Joshi (6.1)-(6.11)", "control/static_programming.py", "control/mpsp.py")
 def test_a_converged_history_is_stationary():
     """First-order optimality: no component in the null space of the sensitivities."""
     plan = mpsp(task(50), TOLERANCE)
@@ -179,3 +175,44 @@ def test_a_plan_reaches_the_goal_or_reports_a_failure(state, goal, duration, ste
     if not plan.failure:
         assert np.isfinite(plan.acceleration).all()
         assert (np.abs(plan.errors[-1]) <= TOLERANCE).all()
+
+
+def place(state):
+    return state[:3], np.eye(3, 6)
+
+
+def distance(state):
+    size = np.linalg.norm(state[:3])
+    return np.array([size]), np.concatenate([state[:3] / size, np.zeros(3)])[None]
+
+
+@pytest.mark.covers(
+    "Joshi (6.1)-(6.11); (7.1)-(7.23); MPSP, fewer outputs than states; G-MPSP, fewer outputs than states",
+    "control/static_programming.py",
+)
+@pytest.mark.parametrize("method", [mpsp, gmpsp])
+@pytest.mark.parametrize(("output", "unit"), [(place, 1e-3), (distance, 1e-3)])
+def test_outputs_fewer_than_states_are_reached_at_less_effort(method, output, unit):
+    """What is not asked for is free: each output more can only cost more."""
+    plan = method(task(100), np.full(len(output(GOAL)[0]), unit), output=output)
+    assert not plan.failure
+    assert plan.errors.shape[1] == len(output(GOAL)[0])
+    assert (np.abs(plan.errors[-1]) <= unit).all()
+    others = [method(task(100), TOLERANCE)]
+    if output is distance:
+        others.append(method(task(100), np.full(3, unit), output=place))
+    for other in others:
+        assert effort(plan) < effort(other)
+
+
+def test_outputs_on_a_linear_model_are_the_minimum_norm_plan():
+    """Closed form for the place alone: u = B' C' (C G C')^-1 C (x_f - Phi x_0)."""
+    model = HillModel(1e-3)
+    plan = mpsp(task(200, model=model), np.full(3, 1e-3), output=place)
+    phi, gamma = model.discretise(0.0, 10.0)
+    maps = [(np.linalg.matrix_power(phi, 199 - k) @ gamma)[:3] for k in range(200)]
+    gramian = sum(each @ each.T for each in maps)
+    missing = (GOAL - model.transition(0.0, 2000.0) @ START)[:3]
+    least = np.array([each.T @ np.linalg.solve(gramian, missing) for each in maps])
+    assert plan.iterations == 1
+    np.testing.assert_allclose(plan.acceleration, least, rtol=0.0, atol=1e-9 * np.abs(least).max())

@@ -145,6 +145,10 @@ def test_a_viewer_sees_a_running_graph_live(desk: Desk, view: Callable[..., View
     server.stop()
 
 
+@pytest.mark.covers(
+    "Kremmydas Listing: simulation animation",
+    differs="any viewer of paths in place of a film of MATLAB's",
+)
 def test_a_bag_is_played_at_its_pace_and_where_a_viewer_seeks(
     fly: Callable[..., Bag], view: Callable[..., View]
 ) -> None:

@@ -124,6 +124,8 @@ def _mark(path: Path, node: Any, verified: str) -> Mark:
         named, *implemented = (ast.literal_eval(each) for each in node.args)
         more = {each.arg: ast.literal_eval(each.value) for each in node.keywords}
         document, rest = named.split(" ", 1)
+        if isinstance(more.get("figures"), str):
+            raise ValueError("figures is a word, not a tuple of words")
         return Mark(place, verified, document, tuple(rest.split("; ")), tuple(implemented), **more)
     except (TypeError, ValueError) as error:
         raise CoverageError(f"{place}: not a mark: {error}") from error

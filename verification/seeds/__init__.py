@@ -33,6 +33,8 @@ What no number and no scale is left of is shown by a picture of the same panels.
 """
 HEADINGS = {
     "seeds": HEADING,
+    "joshi": f"# Joshi: what the tables leave out\n{TOLERANCES}",
+    "owis": f"# Owis: beyond the two transfers\n{TOLERANCES}",
     "neokleous": f"# Neokleous: the figures of the thesis\n{TOLERANCES}",
     "roberts": f"# Roberts: the figures of the paper\n{TOLERANCES}",
     "kremmydas": f"# Kremmydas: acquisitions and cost\n{TOLERANCES}",

@@ -231,7 +231,7 @@ covers(
     "Neokleous 5.3.3, poles and zeros",
     figures=("5.3.3: imaginary part of the poles", "5.3.3: zeros", "5.3.3: number of zeros"),
 )
-covers("Neokleous 5.3.4, functional controllability", figures=("5.3.4: normal rank of G",))
+covers("Neokleous 5.3.4", figures=("5.3.4: normal rank of G",))
 covers("Neokleous (5.22), (5.23)", figures=("(5.22): upper LFT less w_P S_p of the perturbed plant",))
 covers(
     "Neokleous (5.24)-(5.32)",
