@@ -264,7 +264,7 @@ covers(
 covers(
     (
         "Neokleous Fig. 1.1; Fig. 2.1; Fig. 2.2; Fig. 2.3; Fig. 2.5; Fig. 2.6; Fig. 2.7; Fig. 2.8; Fig. "
-        "2.11; Fig. 3.1; Fig. 3.2; Fig. 4.1; Fig. 5.1; Fig. 5.3; Fig. 5.4; Fig. 5.5; Fig. 5.6; Fig. 5.7"
+        "2.11; Fig. 3.1; Fig. 3.2; Fig. 4.1; Fig. 5.1; Fig. 5.2; Fig. 5.3; Fig. 5.4; Fig. 5.5; Fig. 5.6; Fig. 5.7"
     ),
     impossible="a drawing, with nothing to compute",
 )

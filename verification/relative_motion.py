@@ -105,6 +105,7 @@ covers(
         "Fig. 10, radial over Hill's",
         "Fig. 10, along-track over Hill's",
     ),
+    differs="what the text says of it comes out; the plot is lost in the text; ours is relative_motion_roberts.png",
 )
 covers(
     "Roberts Fig. 12",
@@ -114,6 +115,7 @@ covers(
         "Fig. 12, along-track drift",
         "Fig. 12, cross-track over the truth's",
     ),
+    differs="what the text says of it comes out; the plot is lost in the text; ours is relative_motion_roberts.png",
 )
 covers("Roberts Fig. 1; Fig. 2", impossible="a drawing, with nothing to compute")
 

@@ -251,7 +251,7 @@ covers(
     differs="(5.36) lacks its < 1; the printed weights meet neither nominal nor robust performance",
 )
 covers(
-    "Neokleous (5.38)-(5.40); Fig. 5.2",
+    "Neokleous (5.38)-(5.40)",
     figures=(
         "(5.40), (5.41): largest mu",
         "(5.40), (6.4)-(6.6): largest mu",
