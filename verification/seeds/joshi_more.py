@@ -8,6 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 
+from formation_gnc.control.static_programming import mpsp
 from formation_gnc.guidance.relative_orbit import RelativeOrbit, RelativeOrbitParameters
 from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.model import RelativeModel
@@ -15,8 +16,8 @@ from verification.coverage.marker import covers
 from verification.figure import Figure, save
 from verification.seeds.accepted import Ours
 from verification.seeds.cases import KM, MU, SEMI_MAJOR_AXIS, Orbit, effort, fly, model
-from verification.seeds.joshi_4_5 import GAIN, goals_of, sdre_thrust
-from verification.seeds.joshi_6_7 import FINAL, NEAR, TIGHT, WIDE, mpsp, task_of, to_go
+from verification.seeds.joshi_4_5 import GAIN, goals_of, sdre_thrust, to_go
+from verification.seeds.joshi_6_7 import FINAL, NEAR, TIGHT, WIDE, task_of
 
 PAGE = "joshi"
 

@@ -95,7 +95,7 @@ def controllability(_: Path, ours: Ours) -> tuple[str, list[Figure]]:
     for column, fill in list(FILLS.items())[1:]:
         a, b = system(fill)(path)
         powers = [b]
-        for _ in range(3):
+        for _power in range(3):
             powers.append(a @ powers[-1])
         values = np.linalg.svd(np.concatenate(powers, axis=2), compute_uv=False)
         least.append(float((values[:, -1] / values[:, 0]).min()))
@@ -120,7 +120,7 @@ def controllability(_: Path, ours: Ours) -> tuple[str, list[Figure]]:
 def soft(_: Path, ours: Ours) -> tuple[str, list[Figure]]:
     """The end weighed by Q_f instead of met."""
     step, fixed = FIRST.duration / STEPS, asre(FIRST, radial, 0.0)
-    _, best = flown(FIRST, fixed.trajectory.inputs, 0.0)
+    _path, best = flown(FIRST, fixed.trajectory.inputs, 0.0)
     lines = [
         "## Owis: a soft end",
         "",
