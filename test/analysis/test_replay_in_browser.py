@@ -29,7 +29,8 @@ SHOW = """(async (share) => {
   slider.value = Number(slider.min) + share * (slider.max - slider.min);
   slider.dispatchEvent(new Event('input'));
   for (const each of document.querySelectorAll('.deputy[open] .figure')) await page.drawFigure(each);
-  const places = (view) => Object.fromEntries([...document.querySelectorAll(`.view[aria-label=${view}] [data-satellite]`)]
+  const satellites = (view) => [...document.querySelectorAll(`.view[aria-label=${view}] [data-satellite]`)];
+  const places = (view) => Object.fromEntries(satellites(view)
     .map((each) => [each.dataset.satellite, [each.getAttribute('cx'), each.getAttribute('cy')].join()]));
   return {
     time: page.time,
