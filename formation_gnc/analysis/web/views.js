@@ -53,7 +53,6 @@ function paintEarth(replay, view, palette) {
   };
   const [behind, before] = orbit(time, time + replay.period, `stroke="${palette.soft}" stroke-width="1"`);
   const [trailBehind, trail] = orbit(time - TRAIL * replay.period, time, 'stroke="#e8862e" stroke-width="2.2"');
-  drawing += behind + trailBehind;
   drawing += `<circle cx="${x}" cy="${y}" r="${1.025 * size}" fill="${palette.rim}" opacity="0.22"/>`;
   drawing += `<circle cx="${x}" cy="${y}" r="${size}" fill="url(#ball)" stroke="${palette.rim}"/>`;
   const turned = graticule(earth.radius, earth.angle + earth.rate * (time - replay.begin));
@@ -61,7 +60,7 @@ function paintEarth(replay, view, palette) {
     const places = each.map((point) => view.place(point));
     drawing += line(places, `stroke="${palette.land}" stroke-width="0.8" opacity="0.6"`, (k) => places[k][2] > 0);
   }
-  drawing += night(view, palette, earth.radius, earth.sun) + before + trail;
+  drawing += night(view, palette, earth.radius, earth.sun) + behind + trailBehind + before + trail;
   const chief = replay.position(replay.chief, frame), velocity = replay.linear(replay.chief, 6, frame).slice(3);
   const radial = unit(chief), normal = unit(cross(chief, velocity)), along = cross(normal, radial);
   const satellites = replay.deputies.map((deputy) => {
@@ -215,6 +214,18 @@ function measure(replay) {
   }
 }
 
+/** Azimuth from which the orbit is open, with the day rather than the night. */
+function sideOf(replay, elevation) {
+  const start = Array.from(replay.chief.slice(0, 6));
+  const normal = unit(cross(start.slice(0, 3), start.slice(3)));
+  const rating = (azimuth) => {
+    const near = [Math.cos(elevation) * Math.cos(azimuth), Math.cos(elevation) * Math.sin(azimuth), Math.sin(elevation)];
+    return 0.15 * dot(near, replay.earth.sun) - Math.abs(Math.abs(dot(near, normal)) - 0.45);
+  };
+  const sides = Array.from({ length: 36 }, (_, k) => (Math.PI * k) / 18);
+  return isPoint(normal) ? sides.reduce((best, each) => (rating(each) > rating(best) ? each : best)) : 0;
+}
+
 /** Events and eclipses over the slider. */
 function drawTrack(replay, svg) {
   const span = replay.end - replay.begin || 1, percent = (time) => (100 * (time - replay.begin)) / span;
@@ -268,8 +279,7 @@ addEventListener("DOMContentLoaded", () => {
   measure(replay);
   const [earth, hill] = [...root.querySelectorAll(".view")];
   const globe = { axes: [[0, 1, 0], [0, 0, 1], [1, 0, 0]], azimuth: 0, elevation: 0.4, reach: [replay.furthest, replay.furthest], centre: [0, 0, 0] };
-  const chief = [replay.chief[0], replay.chief[1]];
-  if (isPoint(chief)) globe.azimuth = Math.atan2(chief[1], chief[0]) - 0.6;
+  globe.azimuth = sideOf(replay, globe.elevation);
   const frame = { axes: [[0, -1, 0], [1, 0, 0], [0, 0, 1]], azimuth: -0.5, elevation: 0.35, reach: [1, 1], centre: replay.middle };
   const views = [
     new View(earth, (view, palette) => paintEarth(replay, view, palette), globe),
