@@ -12,7 +12,7 @@ shared := -p xdist -n auto --dist worksteal
 .PHONY: help setup demo test test-fast check bench verify fuzz lock clean force
 
 help:
-	@echo "make demo        fly the default scenario on the node graph, and record it"
+	@echo "make demo        fly the default scenario on the node graph, record it, and write its page"
 	@echo "make test        lint, types and the test suite"
 	@echo "make test-fast   the quick ones of the tests that start no node processes"
 	@echo "make check       lint and types"
@@ -26,7 +26,7 @@ help:
 setup: install/.ready
 
 demo: setup
-	@$(in_environment) formation-gnc sil leader_follower
+	@$(in_environment) formation-gnc sil leader_follower --page
 
 check: setup
 	@$(in_environment) ruff check . && ruff format --check . && mypy

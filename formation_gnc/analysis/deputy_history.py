@@ -37,9 +37,11 @@ class DeputyHistory:
         acceleration: (N, 3) by thrust, over the tick before, m/s^2.
         delta_v: (N,) so far, all axes added, m/s.
         total_delta_v: over all ticks, m/s.
-        target: (L, 6) target states at the selected ticks that have one.
+        impulse: (N, 3) by thrust so far, signed, per mass, m/s.
+        target, target_time: (L, 6) target states at the selected ticks that have one.
         control_error, control_time: (P, 6) truth minus target, where a selected tick has both.
         estimation_error, estimation_time: (M, 6) estimate minus truth, where a selected tick has both.
+        covariance: (K, 6, 6) of the filter.
         sigma, sigma_time: (K, 6) standard deviations of the filter.
         eclipses: begin and end of each.
         readings: (n, 2) time and value by sensor and component.
@@ -60,11 +62,11 @@ class DeputyHistory:
         self._unseen = unseen
         self.name, self._selection = name, selection
         self._prefix = f"deputies.{index}."
-        self._truth = _Columns("relative_state", "acceleration", "delta_v")
-        self._estimate, self._target = _Columns("relative_state", "covariance"), _Columns("relative_state")
+        self._truth = TickColumns("relative_state", "acceleration", "delta_v", "impulse")
+        self._estimate, self._target = TickColumns("relative_state", "covariance"), TickColumns("relative_state")
         self._readings, self._innovations = SensorSeries.of_readings(), SensorSeries.of_innovations()
         self._timing, self._solver = ThinnedByKey[str](2), Thinned(2)
-        self._seen_delta_v, self._in_eclipse = 0.0, False
+        self._seen_delta_v, self._seen_impulse, self._in_eclipse = 0.0, np.zeros(3), False
         self.eclipses: list[list[float]] = []
         self.handlers: dict[str, Handler] = {
             topics.ESTIMATE.name: Handler(self._add_estimate, ("relative_state", "covariance", "innovations")),
@@ -81,12 +83,15 @@ class DeputyHistory:
         tick = self._selection.tick_ns * 1e-9
         seen = self._seen_delta_v + np.cumsum(np.abs(acceleration).sum(axis=1) * tick)
         self._seen_delta_v = float(seen[-1])
+        impulse = self._seen_impulse + np.cumsum(acceleration, axis=0) * tick
+        self._seen_impulse = impulse[-1]
         total = seen + self._unseen.delta_v_until(batch["stamp_ns"], tick)
         columns = {
             "stamp_ns": batch["stamp_ns"],
             "relative_state": batch[f"{self._prefix}relative_state"],
             "acceleration": acceleration,
             "delta_v": total,
+            "impulse": impulse,
         }
         self._truth.add(columns, self._selection(batch["stamp_ns"]))
         self._add_eclipses(batch["time"] / HOUR, batch[f"{self._prefix}eclipse"].astype(bool))
@@ -135,16 +140,18 @@ class DeputyHistory:
         self.estimation_error, self.estimation_time = self._minus_truth(stamps, self._estimate)
         negative, self.control_time = self._minus_truth(stamps, self._target)
         self.control_error: Matrix = -negative
-        covariance = self._estimate["covariance"].reshape(-1, 6, 6)
-        self.sigma: Matrix = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+        self.impulse: Matrix = self._truth["impulse"]
+        self.covariance: Matrix = self._estimate["covariance"].reshape(-1, 6, 6)
+        self.sigma: Matrix = np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
         self.sigma_time: Vector = self._estimate["stamp_ns"] / 3.6e12
         self.target: Matrix = self._target["relative_state"].reshape(-1, 6)
+        self.target_time: Vector = self._target["stamp_ns"] / 3.6e12
         self.readings: dict[Channel, Matrix] = self._readings.rows
         self.innovations: dict[Channel, Matrix] = self._innovations.rows
         self.timing: dict[str, Matrix] = self._timing.rows
         self.solver: Matrix = self._solver.rows
 
-    def _minus_truth(self, stamps: NDArray[np.int64], other: "_Columns") -> tuple[Matrix, Vector]:
+    def _minus_truth(self, stamps: NDArray[np.int64], other: "TickColumns") -> tuple[Matrix, Vector]:
         """Relative states of `other` minus the truth, and their times."""
         common, rows, others = np.intersect1d(stamps, other["stamp_ns"], return_indices=True)
         if not len(common):
@@ -152,16 +159,19 @@ class DeputyHistory:
         return other["relative_state"][others] - self.truth[rows], common / 3.6e12
 
 
-class _Columns:
+class TickColumns:
     """Selected rows of some fields, collected batch by batch."""
 
     def __init__(self, *fields: str) -> None:
+        """Start without rows of these fields and of their stamps."""
         self._parts: dict[str, list[NDArray[Any]]] = {name: [] for name in ("stamp_ns", *fields)}
 
     def add(self, columns: Mapping[str, NDArray[Any]], rows: NDArray[np.bool_]) -> None:
+        """Add what is selected of the next batch."""
         for name, part in self._parts.items():
             part.append(columns[name][rows])
 
     def __getitem__(self, name: str) -> NDArray[Any]:
+        """All rows of a field."""
         part = self._parts[name]
         return np.concatenate(part) if part else np.zeros(0)

@@ -8,10 +8,8 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from formation_gnc.analysis.plot import Axis, Curve, Plot, Style, Track
+from formation_gnc.analysis.plot import Axis, Curve, Plot, Style
 from formation_gnc.analysis.timeline import Timeline
-
-SLIDER_STEPS = 120
 
 _ROW_HEIGHT = 210  # px
 _LARGE_HEIGHT = 520  # px, of a plot that is not over time
@@ -48,27 +46,6 @@ def draw_columns(columns: Sequence[Sequence[Plot]], timeline: Timeline) -> go.Fi
     return figure
 
 
-def draw_space(plot: Plot) -> go.Figure:
-    """Figure of a plot in space, with a slider that moves its tracks."""
-    assert plot.z is not None, "a plot in space has three axes"
-    figure = go.Figure()
-    for curve in plot.curves:
-        figure.add_scatter3d(x=curve.x, y=curve.y, z=curve.z, name=curve.label, **_look(curve.style))
-    if plot.tracks:
-        _add_slider(figure, plot.tracks)
-    scene = {
-        "xaxis_title": plot.x.title,
-        "yaxis_title": plot.y.title,
-        "zaxis_title": plot.z.title,
-        "aspectmode": "auto",  # a cube when a path is much longer than wide
-        "camera": {"eye": {"x": 1.5, "y": 1.5, "z": 0.9}, "center": {"x": 0, "y": 0, "z": -0.15}},
-    }
-    margin = {"t": 40, "b": 50, "l": 0, "r": 0}
-    figure.update_layout(height=780, margin=margin, template="plotly_white", scene=scene)
-    figure.update_layout(legend={**_LEGEND, "yanchor": "bottom", "y": 1.0}, modebar={"orientation": "v"})
-    return figure
-
-
 def _add_plot(figure: go.Figure, row: int, column: int, plot: Plot, shown: set[str]) -> None:
     """Add a plot; `shown` has the labels that are in the legend of the figure."""
     for curve in plot.curves:
@@ -90,7 +67,8 @@ def _add_plot(figure: go.Figure, row: int, column: int, plot: Plot, shown: set[s
 
 def _trace(curve: Curve, **properties: Any) -> Any:
     kind = go.Scattergl if curve.style.line == "none" else go.Scatter
-    return kind(x=curve.x, y=curve.y, **properties)
+    with np.errstate(over="ignore"):
+        return kind(x=curve.x.astype(np.float32), y=curve.y.astype(np.float32), **properties)  # half of the page
 
 
 def _look(style: Style) -> dict[str, Any]:
@@ -109,31 +87,6 @@ def _axis(axis: Axis) -> dict[str, Any]:
     if axis.reversed:
         properties["autorange"] = "reversed"
     return properties
-
-
-def _add_slider(figure: go.Figure, tracks: Sequence[Track]) -> None:
-    """Add the tracks at their first time, and a slider over all times."""
-    first = len(figure.data)
-    for track in tracks:
-        point = dict(zip("xyz", track.position[:1].T, strict=True))
-        figure.add_scatter3d(**point, name=track.label, **_look(track.style))
-    traces = list(range(first, first + len(tracks)))
-    time = tracks[0].time
-    frames, steps = [], []
-    for row in np.unique(np.linspace(0, len(time) - 1, SLIDER_STEPS).round().astype(int)):
-        name = f"{3600.0 * time[row]:.0f}"
-        points = [go.Scatter3d(**{axis: [track.position[row, k]] for k, axis in enumerate("xyz")}) for track in tracks]
-        frames.append(go.Frame(name=name, data=points, traces=traces))
-        at_once = {"mode": "immediate", "frame": {"duration": 0, "redraw": True}, "transition": {"duration": 0}}
-        steps.append({"label": name, "method": "animate", "args": [[name], at_once]})
-    figure.frames = frames
-    slider = {
-        "steps": steps,
-        "currentvalue": {"prefix": "time [s]: "},
-        "pad": {"t": 20, "b": 20, "l": 20, "r": 20},
-        "font": {"size": 10},
-    }
-    figure.update_layout(sliders=[slider])
 
 
 def _mark(figure: go.Figure, timeline: Timeline, columns: int) -> None:

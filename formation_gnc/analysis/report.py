@@ -1,27 +1,47 @@
 """A recorded run as one self-contained HTML page, of bounded size whatever the length of the bag."""
 
-from collections.abc import Sequence
+import json
+import shlex
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import Any
 
-import plotly.graph_objects as go
-
 from formation_gnc.analysis.figure_table import FIGURES
 from formation_gnc.analysis.figures import figures
-from formation_gnc.analysis.page import section, table, write_page
+from formation_gnc.analysis.page import data, section, table, write_page
 from formation_gnc.analysis.panels.panel import Panel
 from formation_gnc.analysis.panels.registry import DEPUTY_PANELS, FLEET_PANELS
 from formation_gnc.analysis.plot import Plot
-from formation_gnc.analysis.plotly_renderer import draw_columns, draw_space
+from formation_gnc.analysis.plotly_renderer import draw_columns
 from formation_gnc.analysis.run_history import RunHistory
+from formation_gnc.analysis.scene import scene_of
 from formation_gnc.analysis.timeline import Timeline
 from formation_gnc.flight import topics
 from formation_gnc.recording.reader import Bag
 from formation_gnc.types import NANOSECONDS
 
+OPEN = 2
+"""Deputies whose figures are unfolded."""
 
-def write_report(bag: Bag, run: RunHistory, path: Path, title: str) -> Path:
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a run on a page is from, and whether a replay gives it again.
+
+    Attributes:
+        name: of the bag, as its commands take it.
+        digest: of the bag's files, SHA-256.
+        differences: between the run and its replay, a line each; None when it was not replayed.
+    """
+
+    name: str
+    digest: str
+    differences: Sequence[str] | None = None
+
+
+def write_report(bag: Bag, run: RunHistory, path: Path, title: str, origin: Origin) -> Path:
     """Write the page; it needs no network and no server.
 
     Args:
@@ -29,37 +49,85 @@ def write_report(bag: Bag, run: RunHistory, path: Path, title: str) -> Path:
         run: its history.
         path: file to write.
         title: of the page.
+        origin: what its badge tells.
 
     Returns:
         The path.
     """
-    charts = _figures(run, FLEET_PANELS, run.timeline)
-    for name, deputy in run.deputies.items():
-        own = _figures(deputy, DEPUTY_PANELS, run.timeline_of(name))
-        charts |= {f"{name}: {heading}": figure for heading, figure in own.items()}
-    sections = [f"<h2>Summary</h2>{table(_summary(run, bag))}<h2>Figures</h2>{_figure_table(bag)}"]
-    sections += [section(heading, figure, number == 0) for number, (heading, figure) in enumerate(charts.items())]
+    sections = [_badge(origin), _replay(run, bag)]
+    tables = {"Summary": table(_summary(run, bag)), "Figures": _figure_table(bag)}
+    told = "".join(f"<div><h2>{heading}</h2>{each}</div>" for heading, each in tables.items())
+    sections.append(f'<div class="tables">{told}</div>')
+    sections += _figures(run, FLEET_PANELS, run.timeline)
+    for number, (name, deputy) in enumerate(run.deputies.items()):
+        own = "".join(_figures(deputy, DEPUTY_PANELS, run.timeline_of(name), f"{name}: "))
+        shown = " open" * (number < OPEN)
+        sections.append(f'<details class="deputy"{shown}><summary>{escape(name)}</summary>{own}</details>')
     sections += [_event_table(run), "<h2>Parameters and provenance</h2>"]
     sections += [
         f"<details><summary>{escape(name)}</summary>{table(values)}</details>"
         for name, values in sorted(bag.metadata.items())
     ]
-    return write_page(path, title, sections)
+    return write_page(path, title, sections, ("replay.js", "views.js"))
 
 
-def _figures[H](history: H, panels: Sequence[Panel[H]], timeline: Timeline) -> dict[str, go.Figure]:
-    """Figures by heading: one for each section that has something to show."""
-    figures = {}
+def _badge(origin: Origin) -> str:
+    """Whether the replay gives the same bits, only if that was tried, and the digest of the bag."""
+    if origin.differences is None:
+        kind, claim = "", "<b>Not replayed.</b> Whether a replay gives the same bits is found out by"
+    elif origin.differences:
+        told = "".join(f"<br>{escape(line)}" for line in origin.differences)
+        kind, claim = "differs", f"<b>The replay differs.</b>{told}<br>Found by"
+    else:
+        kind, claim = "same", "<b>The replay gives the same bits</b> on every GNC topic. Checked by"
+    command = escape(f"formation-gnc replay {shlex.quote(origin.name)}")
+    return (
+        f'<p class="badge {kind}">{claim} <code>{command}</code>'
+        f'<br>SHA-256 of the bag: <code class="digest">{origin.digest}</code></p>'
+    )
+
+
+def _replay(run: RunHistory, bag: Bag) -> str:
+    """The two views, the controls of their time, and whom the colours of the track mean."""
+    tools = '<button class="out" title="smaller">−</button><button class="in" title="larger">+</button>'
+    tools += '<button class="save" title="save as SVG">SVG</button>'
+    centres = "".join(f'<option value="{escape(name)}">{escape(name)}</option>' for name in run.deputies)
+    choice = f'<select aria-label="centre"><option value="">whole formation</option>{centres}</select>'
+    view = (
+        '<figure class="view" aria-label="{}"><svg role="img"></svg><div class="tools">{}</div>'
+        "<figcaption></figcaption></figure>"
+    )
+    views = view.format("orbit", tools) + view.format("formation", choice + tools)
+    speeds = "".join(
+        f'<option value="{speed}"{" selected" * (speed == 1)}>{word}</option>'
+        for speed, word in ((0.1, "slowest"), (0.3, "slow"), (1, "normal"), (4, "fast"))
+    )
+    colours = run.timeline.colours
+    keys = "".join(
+        f'<span style="--key: {colours[kind]}">{escape(kind)}</span>'
+        for kind in dict.fromkeys(mark.kind for mark in run.events)
+    )
+    keys += '<span style="--key: #8886">eclipse</span>' * any(each.eclipses for each in run.deputies.values())
+    return (
+        f'<div class="replay"><div class="views">{views}</div>{data(json.dumps(scene_of(run, bag)))}</div>'
+        f'<div class="keys">{keys}</div><div class="time"><button>▶ play</button><div class="track"><svg></svg>'
+        f'<input type="range" aria-label="time"></div><output></output>'
+        f'<select aria-label="speed">{speeds}</select></div>'
+    )
+
+
+def _figures[H](history: H, panels: Sequence[Panel[H]], timeline: Timeline, prefix: str = "") -> Iterator[str]:
+    """A figure for each section that has something to show in the plane; in space there is the replay."""
     for heading in dict.fromkeys(panel.heading for panel in panels):
         columns: dict[int, list[Plot]] = {}
         for panel in panels:
             if panel.heading == heading:
-                columns.setdefault(panel.column, []).extend(panel.plots(history))
+                plots = [plot for plot in panel.plots(history) if plot.z is None]
+                columns.setdefault(panel.column, []).extend(plots)
         plots = [plot for column in columns.values() for plot in column]
         if plots:
-            in_space = plots[0].z is not None
-            figures[heading] = draw_space(plots[0]) if in_space else draw_columns(list(columns.values()), timeline)
-    return figures
+            figure = draw_columns(list(columns.values()), timeline)
+            yield section(f"{prefix}{heading}", figure, all(plot.over_time for plot in plots))
 
 
 def _summary(run: RunHistory, bag: Bag) -> dict[str, Any]:
@@ -91,7 +159,7 @@ def _figure_table(bag: Bag) -> str:
 
 def _event_table(run: RunHistory) -> str:
     rows = "".join(
-        f"<tr><td>{3600.0 * mark.time:.3f}</td>"
+        f'<tr data-time="{3600.0 * mark.time:.3f}"><td>{3600.0 * mark.time:.3f}</td>'
         + "".join(f"<td>{escape(word)}</td>" for word in (mark.kind, mark.subject, mark.node, mark.detail))
         + "</tr>"
         for mark in run.events

@@ -5,7 +5,7 @@ from itertools import combinations, islice
 
 import numpy as np
 
-from formation_gnc.analysis.deputy_history import HOUR, DeputyHistory, Handler
+from formation_gnc.analysis.deputy_history import HOUR, DeputyHistory, Handler, TickColumns
 from formation_gnc.analysis.separation import Separation, minimum_separation
 from formation_gnc.analysis.thinning import ThinnedByKey, TickSelection
 from formation_gnc.analysis.timeline import Mark, Timeline, event_colours
@@ -13,7 +13,7 @@ from formation_gnc.analysis.trajectory import deputies_of, event_kinds, unseen_t
 from formation_gnc.flight import topics
 from formation_gnc.recording.fields import Fields
 from formation_gnc.recording.reader import Bag
-from formation_gnc.types import Matrix
+from formation_gnc.types import Matrix, Vector
 
 EVENTS = 300
 """Events kept at most."""
@@ -29,6 +29,8 @@ class RunHistory:
         distances: (N, 2) time (h) and distance (m), thinned, by pair of deputies.
         nearest: nearest approach over all ticks; None for a single deputy.
         tick: time between ticks, s.
+        time: (N,) selected ticks with truth, h.
+        chief: (N, 6) inertial states of the chief at `time`.
 
     Raises:
         BagError: the bag has no truth, or lacks a field.
@@ -38,7 +40,8 @@ class RunHistory:
     def __init__(self, bag: Bag) -> None:
         """Read the bag once."""
         names = deputies_of(bag)
-        selection = TickSelection(bag)
+        self._selection, self._chief = TickSelection(bag), TickColumns("chief_state")
+        selection = self._selection
         self.tick = selection.tick_ns * 1e-9
         self.deputies = {
             name: DeputyHistory(index, name, selection, unseen_thrust(bag, name)) for index, name in enumerate(names)
@@ -48,7 +51,7 @@ class RunHistory:
         self.nearest: Separation | None = None
         self._distances = ThinnedByKey[tuple[str, str]](2)
         handlers = {
-            topics.TRUTH.name: Handler(self._add_truth, ("deputies",)),
+            topics.TRUTH.name: Handler(self._add_truth, ("chief_state", "deputies")),
             topics.EVENTS.name: Handler(self._add_events, ("kind", "node", "subject", "detail")),
         }
         for name, deputy in self.deputies.items():
@@ -58,6 +61,8 @@ class RunHistory:
             handlers[topic].add(batch)
         for deputy in self.deputies.values():
             deputy.finish(bag.end_ns / 3.6e12)
+        self.time: Vector = self._chief["stamp_ns"] / 3.6e12
+        self.chief: Matrix = self._chief["chief_state"]
         self.distances: dict[tuple[str, str], Matrix] = self._distances.rows
 
     @property
@@ -78,6 +83,7 @@ class RunHistory:
         return Timeline(events, self.deputies[deputy].eclipses, event_colours(self.event_counts))
 
     def _add_truth(self, batch: Fields) -> None:
+        self._chief.add(batch, self._selection(batch["stamp_ns"]))
         for deputy in self.deputies.values():
             deputy.add_truth(batch)
         names = list(self.deputies)

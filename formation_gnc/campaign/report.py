@@ -37,7 +37,7 @@ OVER_TIME = 8
 FAILED = 100
 """Cases that raised, listed at most."""
 
-_COLOURS = {Verdict.MET: "#d9f2d9", Verdict.NOT_MET: "#f8d7d7", Verdict.NOT_ENOUGH_RUNS: "#fff3cd"}
+_CLASSES = {Verdict.MET: "met", Verdict.NOT_MET: "missed", Verdict.NOT_ENOUGH_RUNS: "open"}
 
 
 def number(value: float | None) -> str:
@@ -93,7 +93,7 @@ def write_report(flights: Flights, outcomes: Sequence[Outcome], path: Path) -> P
         plots = [plot for column in columns for plot in column]
         if any(len(curve.x) for plot in plots for curve in plot.curves):
             figure, drawn = draw_columns(columns, Timeline((), (), {})), drawn + 1
-            sections.append(section(heading, figure, drawn == 1) + below)
+            sections.append(section(heading, figure) + below)
             draw_column(plots, pictures / f"{drawn:02d}_{_file_name(heading)}.png")
     sections += [_differences(flights), _worst(flights), _failed(flights)]
     return write_page(path, f"Campaign {flights.campaign.name}", sections)
@@ -126,7 +126,7 @@ def _verdicts(outcomes: Sequence[Outcome]) -> str:
     rows = ""
     for outcome in outcomes:
         cells = "".join(f"<td>{escape(each)}</td>" for each in outcome_row(outcome))
-        rows += f"<tr style='background: {_COLOURS[outcome.verdict]}'>{cells}</tr>"
+        rows += f"<tr class='{_CLASSES[outcome.verdict]}'>{cells}</tr>"
     explained = (
         "<p>Bound: what the required share of all flights keeps with the confidence, by order statistics; for a mean, "
         "the mean. Margin: from there to the limit. Runs needed: with which the requirement is met if no more fail.</p>"

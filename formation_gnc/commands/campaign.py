@@ -229,9 +229,11 @@ def _fly_one(campaign: Campaign, directory: Path, options: argparse.Namespace) -
     configuration = _configuration(campaign, options.variant)
     scenario = scenario_of(campaign, options.only, configuration)
     bag = options.bag or Path("bags") / f"{campaign.name}_{options.only}"
-    given = {"bag": bag, "json": options.json, "in_process": not options.on_graph}
-    others = {"accept_lost": True, "composed": False, "display": False}
-    status = sil.fly(scenario, argparse.Namespace(**given, **others))
+    given = {"bag": bag, "json": options.json, "in_process": not options.on_graph, "accept_lost": True}
+    parser = argparse.ArgumentParser()
+    sil.add_arguments(parser)
+    usual = vars(parser.parse_args([scenario.name]))
+    status = sil.fly(scenario, argparse.Namespace(**usual | given))
     if status == 0 and directory.is_dir():
         _compare(campaign, directory, options.only, configuration.name, bag)
     return status

@@ -9,12 +9,14 @@ import argparse
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from formation_gnc.analysis.compare import gnc_topics
 from formation_gnc.commands.reading import numbered, print_remarks, runs_of
 from formation_gnc.flight.graph import MODULES
 from formation_gnc.recording import Bag, identical
 from formation_gnc.recording.arithmetic import ARITHMETIC, difference_of_arithmetic
+from formation_gnc.recording.difference import Difference
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,6 +47,21 @@ def run(options: argparse.Namespace) -> int:
         print("formation-gnc: the replay does not give the recorded outputs", file=sys.stderr)
         return 1
     return 0
+
+
+def differences_of_replay(bag: Bag) -> list[Difference]:
+    """Replay a run unchanged, into a bag that is not kept, and compare; empty when both are identical.
+
+    Raises:
+        ConfigurationError: the recorded parameters cannot be flown.
+    """
+    from formation_gnc.transport.replay_recorder import replay_into
+
+    with TemporaryDirectory(prefix="formation_gnc-") as directory:
+        output = Path(directory) / "replay"
+        replay_into(bag, output, list(MODULES), None)
+        replayed = Bag(output)
+        return identical(bag, replayed, gnc_topics(bag, replayed))
 
 
 def _replay(bag: Bag, output: Path, options: argparse.Namespace) -> bool:

@@ -7,7 +7,9 @@ objects run in this process, to the same bits and faster. Exit status 3 means th
 import argparse
 import dataclasses
 import json
+import os
 import sys
+import webbrowser
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -27,6 +29,8 @@ from formation_gnc.sil.scenario import Scenario, duration_of, load_scenario
 
 if TYPE_CHECKING:
     from formation_gnc.analysis.figures import RunFigures
+    from formation_gnc.analysis.run_history import RunHistory
+    from formation_gnc.recording.reader import Bag
 
 LOST_STATUS = 3
 """Exit status of a run whose formation is lost."""
@@ -72,6 +76,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--display", action="store_true", help="draw the run as markers and transforms, for RViz or Foxglove"
+    )
+    parser.add_argument(
+        "--page",
+        action="store_true",
+        help="replay the run, write its page, which tells whether that gave the same bits, and on a desktop open it",
     )
     parser.add_argument("--accept-lost", action="store_true", help="exit with status 0 also when the formation is lost")
     parser.add_argument("--json", action="store_true", help="print the figures as one JSON object")
@@ -232,6 +241,7 @@ def _summarise(scenario: Scenario, bag: Path, speedup: float, options: argparse.
         "least predicted without thrust": predicted_approach(recorded, "passive"),
     }
     picture = draw_overview(flown, bag / "overview.png", scenario.name)
+    page = _page(recorded, flown, bag / "report.html", scenario.name) if options.page else None
     status = LOST_STATUS if result.verdict is Verdict.LOST and not options.accept_lost else 0
     if options.json:
         summary = {
@@ -246,6 +256,8 @@ def _summarise(scenario: Scenario, bag: Path, speedup: float, options: argparse.
             "picture": str(picture),
             "deputies": {name: dataclasses.asdict(each) for name, each in result.deputies.items()},
         }
+        if page is not None:
+            summary["page"] = str(page)
         names = ("minimum_separation_m", "planned_separation_m", "passive_separation_m")
         for name, each in zip(names, separations.values(), strict=True):
             if each is not None:
@@ -262,8 +274,21 @@ def _summarise(scenario: Scenario, bag: Path, speedup: float, options: argparse.
         if separation is not None:
             pair = " and ".join(separation.pair)
             console.print(f"{label}: {separation.distance:.1f} m, {pair} at {separation.time:.0f} s")
-    console.print(f"bag: {bag}\npicture: {picture}", soft_wrap=True)
+    console.print(f"bag: {bag}\npicture: {picture}" + (f"\npage: {page}" if page else ""), soft_wrap=True)
     return status
+
+
+def _page(bag: "Bag", flown: "RunHistory", path: Path, title: str) -> Path:
+    from formation_gnc.commands.report import write_page_of
+
+    open_page(write_page_of(bag, flown, path, title, replayed=True))
+    return path
+
+
+def open_page(path: Path) -> None:
+    """Open a page in the browser, where there is a desktop and somebody who sees it."""
+    if sys.stdout.isatty() and (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        webbrowser.open(path.absolute().as_uri())
 
 
 def _print_figures(console: Console, title: str, result: "RunFigures") -> None:

@@ -1,18 +1,14 @@
 """Trajectories of a recorded run, as files of ephemerides hold them."""
 
-import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from formation_gnc.analysis.recorded_parameters import epoch_of
 from formation_gnc.analysis.trajectory import deputies_of
-from formation_gnc.common import FIRST_EPOCH, LAST_EPOCH
 from formation_gnc.errors import BagError
 from formation_gnc.flight import topics
-from formation_gnc.flight.graph import PLANT
-from formation_gnc.recording.provenance import parameters_record
 from formation_gnc.recording.reader import Bag
 from formation_gnc.types import Matrix, Vector
 
@@ -27,7 +23,7 @@ class Ephemeris:
 
     name: str
     epoch: float
-    """Terrestrial Time at time zero, s since J2000.0."""
+    """Terrestrial Time at time zero, s since J2000.0; zero where the bag does not say."""
     times: Vector
     """(N,) s, ascending."""
     states: Matrix
@@ -53,18 +49,9 @@ def ephemerides(bag: Bag) -> list[Ephemeris]:
     columns = {CHIEF: (truth["chief_state"], np.zeros_like(truth["chief_state"]))}
     for index, name in enumerate(names):
         columns[name] = (truth[f"deputies.{index}.inertial_state"], truth[f"deputies.{index}.relative_state"])
-    times, epoch = truth["time"], _epoch(bag.metadata)
+    times, epoch = truth["time"], epoch_of(bag.metadata) or 0.0
     for name, states in columns.items():
         wrong = ~np.isfinite(np.hstack(states)).all(axis=1)
         if wrong.any():
             raise BagError(f"{bag.path}: truth of {name} at {times[wrong][0]:g} s is not finite; it must be")
     return [Ephemeris(name, epoch, times, *states) for name, states in columns.items()]
-
-
-def _epoch(metadata: Mapping[str, Mapping[str, str]]) -> float:
-    """The run's epoch, s of TT since J2000.0; J2000.0 itself where the bag does not say."""
-    try:
-        epoch = float(json.loads(metadata[parameters_record(PLANT)]["epoch"]))
-    except (KeyError, ValueError, TypeError):
-        return 0.0
-    return epoch if FIRST_EPOCH <= epoch <= LAST_EPOCH else 0.0

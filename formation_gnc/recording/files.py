@@ -2,6 +2,7 @@
 
 import tempfile
 from collections.abc import Callable
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,20 @@ def bag_files(path: Path) -> list[Path]:
     if not files:
         raise BagError(f"{path}: holds no .mcap or .db3 file")
     return sorted(files, key=lambda file: (file_number(file.name.partition(".")[0]), file.name))
+
+
+def digest_of(path: Path) -> str:
+    """SHA-256 of the files of a bag one after the other, in hexadecimal; of a single one, that of `sha256sum`.
+
+    Raises:
+        BagError: there is no such bag.
+    """
+    digest = sha256()
+    for file in bag_files(path):
+        with file.open("rb") as stream:
+            while part := stream.read(1 << 20):
+                digest.update(part)
+    return digest.hexdigest()
 
 
 def missing_files(path: Path) -> list[str]:

@@ -14,7 +14,7 @@ from formation_gnc.analysis.overview import draw_overview, draw_panels
 from formation_gnc.analysis.panels.panel import DeputyPanel, FleetPanel
 from formation_gnc.analysis.panels.registry import DEPUTY_PANELS, FLEET_PANELS
 from formation_gnc.analysis.plot import TIME, Axis, Curve, Plot, Track
-from formation_gnc.analysis.report import write_report
+from formation_gnc.analysis.report import Origin, write_report
 from formation_gnc.analysis.run_history import RunHistory
 from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.writer import BagWriter
@@ -72,7 +72,7 @@ def test_a_new_panel_is_in_overview_pictures_and_page(
     draw_overview(history, tmp_path / "overview.png", "one")
     assert "toy title" in drawn
     assert tmp_path / "deputy1_toy.png" in draw_panels(history, tmp_path)
-    page = write_report(bag, history, tmp_path / "report.html", "one").read_text()
+    page = write_report(bag, history, tmp_path / "report.html", "one", Origin("bag", "0")).read_text()
     assert "<h2>deputy1: toy</h2>" in page
     assert "distance of the toy" in page
     assert "toy axis [m]" in page

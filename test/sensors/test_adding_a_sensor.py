@@ -64,7 +64,7 @@ SIGMA = (0.5, 0.5, 1.0)
 
 def fly(directory: str) -> dict[str, Any]:
     """Five minutes with the toy sensor every second tick, 20 s late, and outliers; what came of it."""
-    from formation_gnc.analysis.report import write_report
+    from formation_gnc.analysis.report import Origin, write_report
     from formation_gnc.analysis.run_history import RunHistory
     from formation_gnc.recording.reader import Bag
     from formation_gnc.recording.writer import BagWriter
@@ -111,7 +111,7 @@ def fly(directory: str) -> dict[str, Any]:
 
         run.fly(sink)
     bag = Bag(Path(directory) / "bag")
-    report = write_report(bag, RunHistory(bag), Path(directory) / "report.html", "toy").read_text()
+    report = write_report(bag, RunHistory(bag), Path(directory) / "report.html", "toy", Origin("toy", "")).read_text()
     drawn = ["relative position [hm]", "relative position X", "relative position Z", "innovation [cm]"]
     return {
         "readings": readings,
