@@ -22,6 +22,7 @@ from formation_gnc.plant.parameters import PlantParameters
 from formation_gnc.recording.layout import LAYOUT, foxglove_layout
 from formation_gnc.recording.parameters import RecorderParameters
 from formation_gnc.recording.player import ReplayParameters
+from formation_gnc.supervision import modes
 from formation_gnc.transport.markers import DisplayParameters
 from tools.architecture import FOUNDATION, PACKAGE, ROOT, WINGS, imports, place, wing
 
@@ -260,12 +261,16 @@ def filled(page: Path, parts: dict[str, str]) -> str:
 
 ARCHITECTURE = DOCS / "architecture.md"
 TOPICS = DOCS / "reference" / "topics.md"
+SUPERVISION = DOCS / "theory" / "supervision.md"
 
 PAGES: dict[Path, Callable[[], str]] = {
     DOCS / "reference" / "parameters.md": parameters_page,
     DOCS / "reference" / LAYOUT: lambda: foxglove_layout(["deputy1"]),
     TOPICS: lambda: filled(TOPICS, {"nodes": nodes_table(), "topics": topics_table()}),
     ARCHITECTURE: lambda: filled(ARCHITECTURE, {"wings": wings_diagram(), "tick": tick_diagram()}),
+    SUPERVISION: lambda: filled(
+        SUPERVISION, {"modes": modes.diagram(), "transitions": modes.table(), "refusals": modes.refusals_table()}
+    ),
 }
 """Generated pages, or pages with generated parts, and what should stand in them."""
 
