@@ -23,6 +23,7 @@ from formation_gnc.recording.layout import LAYOUT, foxglove_layout
 from formation_gnc.recording.parameters import RecorderParameters
 from formation_gnc.recording.player import ReplayParameters
 from formation_gnc.supervision import modes
+from formation_gnc.supervision import registry as monitors
 from formation_gnc.transport.markers import DisplayParameters
 from tools.architecture import FOUNDATION, PACKAGE, ROOT, WINGS, imports, place, wing
 
@@ -269,7 +270,13 @@ PAGES: dict[Path, Callable[[], str]] = {
     TOPICS: lambda: filled(TOPICS, {"nodes": nodes_table(), "topics": topics_table()}),
     ARCHITECTURE: lambda: filled(ARCHITECTURE, {"wings": wings_diagram(), "tick": tick_diagram()}),
     SUPERVISION: lambda: filled(
-        SUPERVISION, {"modes": modes.diagram(), "transitions": modes.table(), "refusals": modes.refusals_table()}
+        SUPERVISION,
+        {
+            "modes": modes.diagram(),
+            "transitions": modes.table(),
+            "refusals": modes.refusals_table(),
+            "monitors": monitors.table(),
+        },
     ),
 }
 """Generated pages, or pages with generated parts, and what should stand in them."""

@@ -1,0 +1,28 @@
+"""Two-sided cumulative sums of normalised samples (Page 1954)."""
+
+from math import isfinite
+
+LARGEST = 5.0
+"""Samples are cut to so many standard deviations: one outlier alone raises no alarm."""
+
+CEILING = 2.0
+"""Largest sum, over the threshold, so that it comes down again when the fault is over."""
+
+
+class Cusum:
+    """Two-sided CUSUM of samples that are N(0, 1) without a fault."""
+
+    __slots__ = ("_ceiling", "_down", "_reference", "_up")
+
+    def __init__(self, reference: float, threshold: float) -> None:
+        """Half the smallest shift to be found, and the threshold, which the caller compares with."""
+        self._reference, self._ceiling = reference, CEILING * threshold
+        self._up = self._down = 0.0
+
+    def add(self, sample: float) -> float:
+        """Add a sample, and return the larger sum; one that is not finite counts as no sample."""
+        if isfinite(sample):
+            sample = min(max(sample, -LARGEST), LARGEST)
+            self._up = min(max(0.0, self._up + sample - self._reference), self._ceiling)
+            self._down = min(max(0.0, self._down - sample - self._reference), self._ceiling)
+        return max(self._up, self._down)

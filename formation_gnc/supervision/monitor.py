@@ -1,0 +1,129 @@
+"""What a health monitor is: fed one observation a tick, it returns its verdicts."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Flag, IntEnum, auto
+from math import inf, isnan
+from typing import ClassVar
+
+from formation_gnc.records import Estimate, Measurement, Status, Target
+from formation_gnc.supervision.modes import Mode
+from formation_gnc.supervision.parameters import SupervisorParameters
+from formation_gnc.supervision.reckoning import Reckoning
+
+SUSPICION = 100.0
+"""Suspicion is raised so many times as often as a failure, without a fault."""
+
+AXES = ("x", "y", "z")
+"""Hill axes, as subjects."""
+
+
+class Level(IntEnum):
+    """How bad it is."""
+
+    OK = 0
+    SUSPECT = 1
+    FAILED = 2
+
+
+class When(Flag):
+    """Which ticks a monitor is fed."""
+
+    READINGS = auto()
+    """Those with readings or innovations."""
+    SLOW = auto()
+    """Every tenth, or one in two minutes: for what changes slowly."""
+    ALWAYS = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What a monitor says of a subject at a tick."""
+
+    monitor: str
+    subject: str
+    """Sensor or axis; empty for the satellite."""
+    level: Level
+    statistic: float
+    threshold: float
+    """Of the statistic, for a failure."""
+
+
+@dataclass(slots=True)
+class Observation:
+    """All that the monitors see of a tick. Times increase from one to the next."""
+
+    time: int
+    """Stamp, ns."""
+    seconds: float
+    """Since the observation before, s; 0 for the first one."""
+    missed: bool
+    """Whether there were ticks in between that were not observed, or this is the first one."""
+    slow: bool
+    """Whether this is a tick of `When.SLOW`."""
+    mode: Mode
+    """In force over the tick that begins now."""
+    measurement: Measurement | None
+    estimate: Estimate | None
+    """None as well where its numbers are not finite."""
+    target: Target | None
+    status: Status | None
+    commanded: list[float] | None
+    """Force (3,) commanded for the tick that has ended, Hill frame, N; None where it is not known."""
+    applied: list[float] | None
+    """Force (3,) applied over that tick, by telemetry."""
+    reckoning: Reckoning | None
+    """Comparison of ephemeris and estimate with their own propagation, at slow ticks."""
+
+
+class Monitor(ABC):
+    """A health monitor. It keeps what it needs of earlier ticks; the docstring of each says what it cannot see.
+
+    A new one is a file in `monitors/` and a line in `registry.py`.
+    """
+
+    name: ClassVar[str]
+    """In fault tables and verdicts."""
+    title: ClassVar[str]
+    """What it watches, in words, for the table of monitors."""
+    test: ClassVar[str]
+    """How it decides, in words."""
+    when: ClassVar[When] = When.SLOW
+    """Ticks that it is fed."""
+
+    def __init__(self, parameters: SupervisorParameters, probability: float) -> None:
+        """Prepare for a flight.
+
+        Args:
+            parameters: of supervision.
+            probability: of a false alarm of this monitor in the whole flight.
+        """
+        self.parameters, self.probability = parameters, probability
+        self.verdicts: dict[str, Verdict] = {}
+        """The latest one of each subject."""
+        self.prepare()
+
+    def prepare(self) -> None:  # noqa: B027 - optional
+        """Compute thresholds and clear the memory."""
+
+    @abstractmethod
+    def feed(self, observation: Observation) -> None:
+        """Take the observation of a tick of `when`, and `judge` the subjects of which it tells something."""
+
+    @classmethod
+    def subjects(cls, parameters: SupervisorParameters) -> Sequence[str]:
+        """What its verdicts may be about."""
+        return ("",)
+
+    def judge(self, subject: str, statistic: float, suspect: float, failed: float) -> None:
+        """Set the verdict on a subject; a statistic that is not a number is a failure."""
+        if isnan(statistic):
+            statistic = inf
+        level = Level.FAILED if statistic >= failed else Level.SUSPECT if statistic >= suspect else Level.OK
+        self.verdicts[subject] = Verdict(self.name, subject, level, statistic, failed)
+
+
+def suspicion(probability: float) -> float:
+    """Probability that a flight without a fault raises a suspicion, given that of a failure."""
+    return min(0.5, SUSPICION * probability)

@@ -1,0 +1,52 @@
+"""The chief's ephemeris against its own propagation."""
+
+from formation_gnc.records import EstimateStatus
+from formation_gnc.supervision.monitor import Monitor, Observation, When
+from formation_gnc.types import NANOSECONDS
+
+CLEAN = 300.0
+"""Time that an ephemeris has to follow an orbit after an alarm, s."""
+
+
+class ChiefEphemeris(Monitor):
+    """Distance of the ephemeris from its propagation since the start of one of two windows of five minutes.
+
+    Bound: a metre and 1/2 a t^2, with a = 1e-4 m/s^2, which no orbit without thrust exceeds. A propagation that the
+    ephemeris has left goes on for up to fifty minutes; the ephemeris is well again after five minutes beside it.
+
+    Assumes: a chief without thrust, and an ephemeris that is good to a metre.
+    Cannot see: another orbit that is followed from the start; a drift below 2 cm/s. A slow drift counts as well again
+    when the bound has outgrown it, at 5 cm/s after a quarter of an hour.
+    Delay: the first comparison after 20 s at 5 cm/s, the first one from 0.2 m/s; a repeated ephemeris at its second
+    tick.
+    """
+
+    name = "chief_ephemeris"
+    title = "chief's ephemeris against its own propagation"
+    test = "bound, 1 m + 5e-5 m/s^2 t^2 within windows of five minutes"
+    when = When.ALWAYS
+
+    def prepare(self) -> None:
+        """Well until told otherwise."""
+        self._last: list[float] = []
+        self._failed_at = -round(CLEAN * NANOSECONDS)
+
+    def feed(self, observation: Observation) -> None:
+        """Look for repeats at every tick, and at the comparison when there is one."""
+        measurement = observation.measurement
+        if measurement is None:
+            return
+        chief = measurement.chief_state.tolist()
+        is_repeated, self._last = chief == self._last, chief
+        estimate = observation.estimate
+        is_lost = estimate is not None and estimate.status == EstimateStatus.CHIEF_LOST
+        reckoning = observation.reckoning
+        ratio = 0.0 if reckoning is None else reckoning.chief
+        if is_repeated:
+            ratio = 2.0
+        if ratio >= 1.0 or is_lost:
+            self._failed_at = observation.time
+        elif reckoning is None:
+            return
+        is_failed = observation.time - self._failed_at < CLEAN * NANOSECONDS
+        self.judge("", max(ratio, 1.0) if is_failed else ratio, 0.5, 1.0)
