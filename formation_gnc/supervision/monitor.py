@@ -102,6 +102,8 @@ class Monitor(ABC):
         self.parameters, self.probability = parameters, probability
         self.verdicts: dict[str, Verdict] = {}
         """The latest one of each subject."""
+        self.notable: dict[str, Verdict] = {}
+        """Those that are not well."""
         self.prepare()
 
     def prepare(self) -> None:  # noqa: B027 - optional
@@ -121,7 +123,16 @@ class Monitor(ABC):
         if isnan(statistic):
             statistic = inf
         level = Level.FAILED if statistic >= failed else Level.SUSPECT if statistic >= suspect else Level.OK
-        self.verdicts[subject] = Verdict(self.name, subject, level, statistic, failed)
+        verdict = self.verdicts[subject] = Verdict(self.name, subject, level, statistic, failed)
+        if level is not Level.OK:
+            self.notable[subject] = verdict
+        elif self.notable:
+            self.notable.pop(subject, None)
+
+    def forget(self, subject: str) -> None:
+        """Take back the verdict on a subject that is not watched any more."""
+        self.verdicts.pop(subject, None)
+        self.notable.pop(subject, None)
 
 
 def suspicion(probability: float) -> float:

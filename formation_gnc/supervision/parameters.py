@@ -6,6 +6,7 @@ from formation_gnc.common import LAST_SECOND
 from formation_gnc.flight.module import ModuleParameters
 from formation_gnc.parameters import parameter
 from formation_gnc.sensors.registry import sensors
+from formation_gnc.supervision.fault_table import DEFAULT
 from formation_gnc.supervision.modes import Mode
 
 
@@ -49,6 +50,12 @@ class SupervisorParameters(ModuleParameters):
         in_flight=True,
         doc="largest standard deviation of the position on any axis while the formation is kept or reconfigured; "
         "ten times of it while it is acquired",
+    )
+    fault_table: tuple[str, ...] = parameter(
+        DEFAULT,
+        in_flight=True,
+        doc="answers to faults, each `{monitor: NAME, subject: PATTERN, persistence: TICKS, response: NAME, "
+        "return: TICKS, modes: [MODE, ...]}` with `mode` for go_to and `laws` for switch_law",
     )
     sensors: tuple[str, ...] = parameter(
         tuple(name for name, sensor in sensors().items() if sensor.on),

@@ -6,6 +6,7 @@ from math import ceil, inf
 import numpy as np
 
 from formation_gnc.errors import ConfigurationError, ImpactError
+from formation_gnc.orbit.constants import EARTH_RADIUS
 from formation_gnc.orbit.frames import hill_rotation, inertial_from_relative, relative_to_first
 from formation_gnc.orbit.propagation import Propagator
 from formation_gnc.records import Estimate, Measurement
@@ -24,8 +25,9 @@ LONGEST = 3000.0
 NOISE = 1.0
 """Largest error of an ephemeris that is well, m."""
 
-UNMODELLED = 1e-4
-"""Largest acceleration beyond point mass and J2, m/s^2: the rest of gravity is below half of it in low orbit."""
+GRAVITY, OTHER = 6e-4, 2e-5
+"""Largest acceleration beyond point mass and J2, m/s^2: of gravity, mostly by J22, at the Earth's surface, falling with
+the fourth power of the radius (EGM2008 has 3.1e-4 at 490 km); of Sun, Moon and drag."""
 
 STEP = 30.0
 """Longest integration step, s."""
@@ -36,13 +38,14 @@ class Reckoning:
     """What comes of propagating from the last comparison to this one."""
 
     chief: float
-    """Largest distance of the ephemeris from its propagation, over what is allowed after a time t: `NOISE` + 1/2
-    `UNMODELLED` t^2. Infinite for an ephemeris that is no orbit."""
+    """Largest distance of the ephemeris from its propagation, over what is allowed after a time t: `NOISE` + 1/2 a
+    t^2, with the largest unmodelled acceleration a. Infinite for an ephemeris that is no orbit."""
     chief_seconds: float
     """Longest of the propagations, s."""
     jump: tuple[float, ...] | None
-    """Estimate less the propagated estimate of the last comparison, (6,), in standard deviations of the latter; None
-    without two estimates of one run of the filter."""
+    """Estimate less the propagated estimate of the last comparison, (6,), beyond what the unmodelled acceleration may
+    differ by between the satellites, in standard deviations of the latter; None without two estimates of one run of the
+    filter."""
 
 
 @dataclass(slots=True)
@@ -125,7 +128,7 @@ class DeadReckoner:
             difference = (estimate.relative_state - relative_to_first(states[-2:])[0]).tolist()
             for axis in range(3):  # the mean of the thrust is in the propagation
                 difference[axis] -= shift[axis] - 0.5 * speed[axis] * self._seconds
-            jump = tuple(abs(each) / sigma for each, sigma in zip(difference, last.sigmas, strict=True))
+            jump = self._in_sigmas(difference, last)
         return Reckoning(*self._compared(ephemeris, states), jump)
 
     def _propagated(self, last: _Last | None) -> Vector | None:
@@ -146,22 +149,43 @@ class DeadReckoner:
             return None
         return states
 
+    def _in_sigmas(self, difference: list[float], last: _Last) -> tuple[float, ...]:
+        """A difference (6,) beyond the allowance, in standard deviations of the last estimate."""
+        radius = _norm(last.chief)
+        differential = 4.0 * _unmodelled(radius) * _norm(last.relative) / radius
+        allowed = (0.5 * differential * self._seconds**2, differential * self._seconds)
+        return tuple(
+            max(0.0, abs(each) - allowed[place // 3]) / sigma
+            for place, (each, sigma) in enumerate(zip(difference, last.sigmas, strict=True))
+        )
+
     def _compared(self, ephemeris: Vector, states: Vector) -> tuple[float, float]:
         """Ratio and time of the ephemeris against the anchors, which move on."""
         x, y, z = ephemeris[:3].tolist()
         ratio, longest = 0.0, 0.0
+        unmodelled = _unmodelled((x * x + y * y + z * z) ** 0.5)
         for anchor, state in zip(self._anchors, states, strict=False):
             rx, ry, rz = state[:3].tolist()
             anchor.state = state
             anchor.seconds += self._seconds
             distance = ((x - rx) ** 2 + (y - ry) ** 2 + (z - rz) ** 2) ** 0.5
-            own = distance / (NOISE + 0.5 * UNMODELLED * anchor.seconds**2)
+            own = distance / (NOISE + 0.5 * unmodelled * anchor.seconds**2)
             if not own < inf:
                 own = inf
             ratio, longest = max(ratio, own), max(longest, anchor.seconds)
             if anchor.seconds >= (WINDOW if own < 1.0 else LONGEST) or own == inf:
                 anchor.state, anchor.seconds = ephemeris, 0.0
         return ratio, longest
+
+
+def _norm(state: Vector) -> float:
+    x, y, z = state[:3].tolist()
+    return float((x * x + y * y + z * z) ** 0.5)
+
+
+def _unmodelled(radius: float) -> float:
+    """Largest acceleration beyond point mass and J2 at a radius (m), m/s^2."""
+    return GRAVITY * (EARTH_RADIUS / radius) ** 4 + OTHER if radius > 0.0 else inf
 
 
 def _sigmas(estimate: Estimate, seconds: float) -> list[float]:

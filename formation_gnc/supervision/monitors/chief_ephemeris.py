@@ -11,19 +11,20 @@ CLEAN = 300.0
 class ChiefEphemeris(Monitor):
     """Distance of the ephemeris from its propagation since the start of one of two windows of five minutes.
 
-    Bound: a metre and 1/2 a t^2, with a = 1e-4 m/s^2, which no orbit without thrust exceeds. A propagation that the
-    ephemeris has left goes on for up to fifty minutes; the ephemeris is well again after five minutes beside it.
+    Bound: a metre and 1/2 a t^2, with a what acts beyond point mass and J2 at most: 4e-4 m/s^2 in low orbit. A
+    propagation that the ephemeris has left goes on for up to fifty minutes; the ephemeris is well again after five
+    minutes beside it.
 
     Assumes: a chief without thrust, and an ephemeris that is good to a metre.
-    Cannot see: another orbit that is followed from the start; a drift below 2 cm/s. A slow drift counts as well again
-    when the bound has outgrown it, at 5 cm/s after a quarter of an hour.
+    Cannot see: another orbit that is followed from the start; in low orbit a drift below 3 cm/s. A slow drift counts as
+    well again when the bound has outgrown it, at 5 cm/s after three minutes.
     Delay: the first comparison after 20 s at 5 cm/s, the first one from 0.2 m/s; a repeated ephemeris at its second
     tick.
     """
 
     name = "chief_ephemeris"
     title = "chief's ephemeris against its own propagation"
-    test = "bound, 1 m + 5e-5 m/s^2 t^2 within windows of five minutes"
+    test = "bound, a metre and what acts beyond J2, within windows of five minutes"
     when = When.ALWAYS
 
     def prepare(self) -> None:

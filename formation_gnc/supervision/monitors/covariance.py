@@ -29,7 +29,7 @@ class Covariance(Monitor):
             return
         factor = LIMITED.get(observation.mode)
         if factor is None:
-            self.verdicts.pop("", None)
+            self.forget("")
             return
         largest = max(standard_deviations(observation.estimate.covariance.diagonal()[:3].tolist()))
         limit = factor * self.parameters.largest_sigma
