@@ -6,7 +6,7 @@ from math import isfinite
 
 from formation_gnc.records import Estimate, EstimateStatus, Measurement, Status, Target, Thrust
 from formation_gnc.supervision.modes import Mode
-from formation_gnc.supervision.monitor import Level, Monitor, Observation, Verdict, When
+from formation_gnc.supervision.monitor import Monitor, Observation, Verdict, When
 from formation_gnc.supervision.parameters import SupervisorParameters
 from formation_gnc.supervision.reckoning import DeadReckoner, Reckoning
 from formation_gnc.supervision.registry import MONITORS
@@ -110,10 +110,6 @@ class Health:
     def notable(self) -> list[Verdict]:
         """The latest verdicts that are not well."""
         return [verdict for monitor in self.monitors if monitor.notable for verdict in monitor.notable.values()]
-
-    def failures(self) -> list[tuple[str, str]]:
-        """Monitor and subject of the latest verdicts that have failed."""
-        return [(each.monitor, each.subject) for each in self.notable() if each.level is Level.FAILED]
 
 
 def _finite(force: list[float]) -> list[float] | None:

@@ -1,6 +1,7 @@
 """Supervision of one deputy, from the records of a tick to its mode and health."""
 
 from dataclasses import replace
+from functools import cache
 
 from formation_gnc.common import ANY_ORBIT
 from formation_gnc.errors import ConfigurationError
@@ -11,7 +12,7 @@ from formation_gnc.sensors.registry import sensors
 from formation_gnc.supervision.fault_table import DEFAULT, Entry, Response, parse, table_of
 from formation_gnc.supervision.health import Health
 from formation_gnc.supervision.modes import COMMANDS, FAULTS, Mode, Step, Trigger, refusal, step
-from formation_gnc.supervision.monitor import AXES, Level
+from formation_gnc.supervision.monitor import AXES, Level, Verdict
 from formation_gnc.supervision.parameters import SupervisorParameters
 from formation_gnc.supervision.records import HealthReport, ModeState, MonitorStatus
 from formation_gnc.supervision.registry import MONITORS
@@ -21,6 +22,9 @@ LEFT = 1.5
 """Control error, over the tube, beyond which the target counts as left."""
 
 type Design = tuple[Entry, ...]
+
+_decide = cache(step)
+"""The same triggers come at tick after tick."""
 
 
 class Supervisor(FlightModule[SupervisorParameters, Design]):
@@ -90,9 +94,11 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         ticks = 1 if self._last < 0 else max(1, (time - self._last) // self.parameters.tick_ns)
         self._last = time
         self._health.feed(time, self._mode, measurement, estimate, target, status, thrust)
-        active = self._responses.evaluate(self._health.failures(), ticks, self._mode)
+        notable = self._health.notable()
+        failures = [(each.monitor, each.subject) for each in notable if each.level is Level.FAILED]
+        active = self._responses.evaluate(failures, ticks, self._mode)
         self._report(time, active)
-        return self._decide(time, estimate, target, active), self._health_report(time, active)
+        return self._decide(time, estimate, target, active), self._health_report(time, notable, active)
 
     def _decide(
         self, time: int, estimate: Estimate | None, target: Target | None, active: list[ActiveResponse]
@@ -104,7 +110,7 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         if self._command is not None:
             triggers.append(self._command)
         self._command = None
-        before, decided = self._mode, step(self._mode, [*triggers, *faults])
+        before, decided = self._mode, _decide(self._mode, (*triggers, *faults))
         for trigger, reason in decided.refusals:
             self.log(time, EventKind.WARNING, f"{trigger}: refused, {reason}", "mode")
         reason = ""
@@ -148,11 +154,10 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
                 self.log(time, EventKind.WARNING, f"over: {each}", each.subject or each.entry.monitor)
         self._active = active
 
-    def _health_report(self, time: int, active: list[ActiveResponse]) -> HealthReport:
+    def _health_report(self, time: int, notable: list[Verdict], active: list[ActiveResponse]) -> HealthReport:
         statuses = [
             MonitorStatus(each.monitor, each.subject, int(each.level), each.statistic, each.threshold)
-            for each in self._health.notable()
-            if each.level is not Level.OK
+            for each in notable
         ]
         isolated, axes, laws = list[str](), list[str](), list[str]()
         for each in active:

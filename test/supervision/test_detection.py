@@ -78,7 +78,7 @@ FAULTS: dict[str, tuple[Corrupt, str, str, int]] = {
     "latitude frozen": (frozen("latitude"), "frozen_readings", "latitude", 35),
     # ninety readings without a miss: a chance of 1/95 each, so five intervals; told at slow ticks
     "range rate dead": (dead("range_rate"), "dropout", "range_rate", 60),
-    "chief's ephemeris frozen": (frozen_chief(), "chief_ephemeris", "", 1),
+    "chief's ephemeris frozen": (frozen_chief(), "chief_ephemeris", "", 10),
     # 1 m + 2.2e-4 m/s^2 t^2 is passed after 23 s by a window that begins with it; by one that has begun, later
     "chief's ephemeris drifting at 5 cm/s": (drifting_chief(0.05), "chief_ephemeris", "", 95),
     "chief's ephemeris drifting at 1 m/s": (drifting_chief(1.0), "chief_ephemeris", "", 15),

@@ -1,7 +1,7 @@
 """The chief's ephemeris against its own propagation."""
 
 from formation_gnc.records import EstimateStatus
-from formation_gnc.supervision.monitor import Monitor, Observation, When
+from formation_gnc.supervision.monitor import Monitor, Observation
 from formation_gnc.types import NANOSECONDS
 
 CLEAN = 300.0
@@ -18,33 +18,23 @@ class ChiefEphemeris(Monitor):
     Assumes: a chief without thrust, and an ephemeris that is good to a metre.
     Cannot see: another orbit that is followed from the start; in low orbit a drift below 3 cm/s. A slow drift counts as
     well again when the bound has outgrown it, at 5 cm/s after three minutes.
-    Delay: the first comparison after 20 s at 5 cm/s, the first one from 0.2 m/s; a repeated ephemeris at its second
-    tick.
+    Delay: the first comparison after 20 s at 5 cm/s, the first one from 0.2 m/s on and of one that is frozen.
     """
 
     name = "chief_ephemeris"
     title = "chief's ephemeris against its own propagation"
     test = "bound, a metre and what acts beyond J2, within windows of five minutes"
-    when = When.ALWAYS
 
     def prepare(self) -> None:
         """Well until told otherwise."""
-        self._last: list[float] = []
         self._failed_at = -round(CLEAN * NANOSECONDS)
 
     def feed(self, observation: Observation) -> None:
-        """Look for repeats at every tick, and at the comparison when there is one."""
-        measurement = observation.measurement
-        if measurement is None:
-            return
-        chief = measurement.chief_state.tolist()
-        is_repeated, self._last = chief == self._last, chief
+        """Judge where there is a comparison, or navigation has lost the chief."""
         estimate = observation.estimate
         is_lost = estimate is not None and estimate.status == EstimateStatus.CHIEF_LOST
         reckoning = observation.reckoning
         ratio = 0.0 if reckoning is None else reckoning.chief
-        if is_repeated:
-            ratio = 2.0
         if ratio >= 1.0 or is_lost:
             self._failed_at = observation.time
         elif reckoning is None:
