@@ -258,7 +258,7 @@ def test_a_changed_replay_differs_only_where_it_was_changed(
 ) -> None:
     changed = tmp_path / "changed.yaml"
     changed.write_text("/**/controller: {ros__parameters: {algorithm: coast}}\n")
-    status, again = replayed(reference, tmp_path / "again", "--params", str(changed))
+    status, again = replayed(reference, tmp_path / "again", "--params", str(changed), "--nodes", "controller")
     assert status == 0
     differing = [difference.topic for difference in identical(Bag(reference), again, gnc_topics(again))]
     assert differing == ["/deputy1/status", "/deputy1/thrust"]

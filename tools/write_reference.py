@@ -171,6 +171,9 @@ def tick_diagram() -> str:
         if row.takes_of_others:
             names = ", ".join(each.topic.name for each in row.takes_of_others)
             lines.append(f"  Note over {row.name}: in a fleet, also {names} of every other satellite")
+        if row.takes_of_before:
+            names = ", ".join(each.topic.name for each in row.takes_of_before)
+            lines.append(f"  Note over {row.name}: with {names} of the tick before")
         for topic in row.gives:
             arrow = "->>" if topic.every_tick else "-->>"
             takers = [*_takers(topic), *(["plant"] if topic == COMMAND else [])]
@@ -199,6 +202,7 @@ def nodes_table() -> str:
     ]
     for row in GRAPH:
         takes = [_code(each.topic) for each in row.takes]
+        takes += [f"of the tick before {_code(each.topic)}" for each in row.takes_of_before]
         takes += [f"in a fleet {_code(each.topic)} of every other deputy" for each in row.takes_of_others]
         gives = [f"in a fleet {_code(topic)}" if topic.fleet_only else _code(topic) for topic in row.gives]
         rows.append((row.name, takes, [*gives, *map(_code, (topics.TIMING, topics.EVENTS))]))

@@ -1,7 +1,8 @@
 """Fly a scenario in software-in-the-loop, record it and print how well it flew.
 
 The node graph runs as real processes over DDS in a ROS domain of its own; with --in-process the same
-objects run in this process, to the same bits and faster. Exit status 3 means that the formation is lost.
+objects run in this process, to the same bits and faster. Exit status 3 means that the formation is lost, 4 that
+a satellite has given it up: its supervisor had it leave the target, for a mode that is safe.
 """
 
 import argparse
@@ -30,6 +31,9 @@ if TYPE_CHECKING:
 
 LOST_STATUS = 3
 """Exit status of a run whose formation is lost."""
+
+GIVEN_UP_STATUS = 4
+"""Exit status of a run in which a satellite has given the formation up, and none has lost it."""
 
 PATIENCE = 3.0
 """Wall time (s) between lines about what the run waits for."""
@@ -73,7 +77,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--display", action="store_true", help="draw the run as markers and transforms, for RViz or Foxglove"
     )
-    parser.add_argument("--accept-lost", action="store_true", help="exit with status 0 also when the formation is lost")
+    parser.add_argument(
+        "--accept-lost", action="store_true", help="exit with status 0 also when the formation is lost or given up"
+    )
     parser.add_argument("--json", action="store_true", help="print the figures as one JSON object")
 
 
@@ -217,6 +223,7 @@ def _fly_in_process(scenario: Scenario, bag: Path, console: Console) -> float:
 
 
 def _summarise(scenario: Scenario, bag: Path, speedup: float, options: argparse.Namespace) -> int:
+    from formation_gnc.analysis.fault_figures import fault_figures
     from formation_gnc.analysis.figures import figures
     from formation_gnc.analysis.overview import draw_overview
     from formation_gnc.analysis.run_history import RunHistory
@@ -232,7 +239,9 @@ def _summarise(scenario: Scenario, bag: Path, speedup: float, options: argparse.
         "least predicted without thrust": predicted_approach(recorded, "passive"),
     }
     picture = draw_overview(flown, bag / "overview.png", scenario.name)
-    status = LOST_STATUS if result.verdict is Verdict.LOST and not options.accept_lost else 0
+    statuses = {Verdict.LOST: LOST_STATUS, Verdict.GIVEN_UP: GIVEN_UP_STATUS}
+    status = 0 if options.accept_lost else statuses.get(result.verdict, 0)
+    faults = fault_figures(flown)
     if options.json:
         summary = {
             "scenario": scenario.name,
@@ -244,6 +253,7 @@ def _summarise(scenario: Scenario, bag: Path, speedup: float, options: argparse.
             "lost": recorded.lost,
             "bag": str(bag),
             "picture": str(picture),
+            "faults": faults,
             "deputies": {name: dataclasses.asdict(each) for name, each in result.deputies.items()},
         }
         names = ("minimum_separation_m", "planned_separation_m", "passive_separation_m")
@@ -256,8 +266,13 @@ def _summarise(scenario: Scenario, bag: Path, speedup: float, options: argparse.
     _print_figures(console, f"{scenario.name}, seed {scenario.plant.seed}", result)
     lost = f", {recorded.lost} messages not recorded" if recorded.lost else ""
     console.print(f"{result.ticks} ticks, {result.misses} missed{lost}, {speedup:,.0f} x real time")
-    lost_deputies = [name for name, each in result.deputies.items() if each.verdict is Verdict.LOST]
-    console.print(f"formation {result.verdict}" + (f": {', '.join(lost_deputies)}" if lost_deputies else ""))
+    worst = [name for name, each in result.deputies.items() if each.verdict is result.verdict]
+    console.print(f"formation {result.verdict}" + (f": {', '.join(worst)}" if result.verdict in statuses else ""))
+    for name, words in faults.items():
+        console.print(f"{name}: modes {' - '.join(words['modes']) or 'unknown'}", soft_wrap=True)
+        for key in ("injected", "detected", "answered"):
+            for line in words[key]:
+                console.print(f"  {key} {line}", soft_wrap=True)
     for label, separation in separations.items():
         if separation is not None:
             pair = " and ".join(separation.pair)

@@ -1,11 +1,14 @@
 """Relative navigation of one deputy, from measurement to estimate."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from enum import Enum
 
 import numpy as np
 
+from formation_gnc.flight.mode import ModeInForce
 from formation_gnc.flight.module import Configuration, FlightModule
+from formation_gnc.mode_records import ModeState, RestrictionKind
 from formation_gnc.navigation.adaptive_noise import AdaptiveNoise
 from formation_gnc.navigation.consistency import UPDATES_TO_DIVERGE, Verdict
 from formation_gnc.navigation.filter_state import Design, FilterState, acquire, expected_observability
@@ -58,6 +61,12 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         self._rejections = Rejections()
         super().__init__(name, parameters)
 
+    def reset(self) -> None:
+        """No mode has been said; the state waits for a fix to end."""
+        self._mode = ModeInForce()
+        self._isolated: tuple[str, ...] = ()
+        """Sensors that are left out by restriction."""
+
     def design(self, parameters: NavigationParameters) -> Design:
         """Process model, constants of a tick, variances."""
         load(parameters.filter)
@@ -88,11 +97,34 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         if new.design.variance != old.design.variance or (
             parameters.observability_window != old.parameters.observability_window
         ):
-            state.observability = expected_observability(state.chief.state, state.filter.state, parameters, new.design)
-            self._report_observability(state)
+            self._begin_observability(state)
 
-    def on_tick(self, measurement: Measurement) -> Estimate | None:
-        """Estimate at the measurement's stamp; none for a measurement that is ignored, and without a state."""
+    @property
+    def _design(self) -> Design:
+        """The design, without the sensors that are isolated; with all of them where none would be left."""
+        design = self.configuration.design
+        if not self._isolated:
+            return design
+        left = {name: each for name, each in design.variance.items() if name not in self._isolated}
+        return replace(design, variance=left or design.variance)
+
+    def _obey(self) -> None:
+        """Leave out the sensors that the mode says, or take them up again."""
+        isolated = self._mode.without(RestrictionKind.SENSOR)
+        if isolated == self._isolated:
+            return
+        self._isolated = isolated
+        if self._state is not None:
+            self._state.noise = AdaptiveNoise()
+            self._begin_observability(self._state)
+
+    def on_tick(self, measurement: Measurement, mode: ModeState | None = None) -> Estimate | None:
+        """Estimate at the measurement's stamp; none for a measurement that is ignored, and without a state.
+
+        mode: of the tick before; None for the one that stands.
+        """
+        if self._mode.take(mode):
+            self._obey()
         action = self._action(measurement)
         if action is _Action.IGNORE:
             return None
@@ -119,7 +151,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
 
     def _warn_of_sensors(self, state: FilterState, time: int) -> None:
         """Log sensors that are noisier than their parameters, or silent."""
-        design = self.configuration.design
+        design = self._design
         silences = state.checks.take_silences(design.variance, state.start, time, design.silent_after)
         for subject, detail in state.noise.take_reports() + silences:
             self.log(time, EventKind.WARNING, detail, subject)
@@ -168,10 +200,17 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
 
     def _acquire(self, measurement: Measurement) -> FilterState:
         self._said_that_it_waits = False
-        self._state = acquire(measurement, self.parameters, self.configuration.design, self._rejections)
+        self._state = acquire(measurement, self.parameters, self._design, self._rejections)
         self.log(measurement.time, EventKind.ACQUIRED, "filter started from an acquisition fix")
         self._report_observability(self._state)
         return self._state
+
+    def _begin_observability(self, state: FilterState) -> None:
+        """Begin a new window with the sensors in use."""
+        state.observability = expected_observability(
+            state.chief.state, state.filter.state, self.parameters, self._design
+        )
+        self._report_observability(state)
 
     def _report_observability(self, state: FilterState) -> None:
         words = state.observability.words
@@ -277,7 +316,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         """Update with the readings that are valid and within the gate; none without a valid reading."""
         if not measurement.readings:
             return None
-        parameters, design = self.parameters, self.configuration.design
+        parameters, design = self.parameters, self._design
         readings = state.checks.accept(
             measurement.readings,
             measurement.time,

@@ -4,22 +4,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from enum import StrEnum
 
-
-class Mode(StrEnum):
-    """What a satellite is doing."""
-
-    STANDBY = "standby"
-    """No thrust, by command; nothing but a command or a fault ends it."""
-    ACQUIRE = "acquire"
-    """On its way to the target, or waiting for a state."""
-    KEEP = "keep"
-    """Control error within the tube."""
-    RECONFIGURE = "reconfigure"
-    """On a transfer that guidance has begun."""
-    AVOID = "avoid"
-    """Evading, since a predicted separation is below its limit."""
-    SAFE = "safe"
-    """On, or on its way to, an orbit that is safe without thrust; left by command alone."""
+from formation_gnc.mode_records import Mode as Mode
 
 
 class Trigger(StrEnum):
@@ -149,7 +134,7 @@ REFUSALS: dict[tuple[Mode, Trigger], str] = {
     (Mode.AVOID, Trigger.TO_KEEP): _EVADING,
     (Mode.AVOID, Trigger.TO_RECONFIGURE): _EVADING,
     (Mode.SAFE, Trigger.TO_KEEP): _REACHED,
-    (Mode.SAFE, Trigger.TO_RECONFIGURE): _GUIDED,
+    (Mode.SAFE, Trigger.TO_RECONFIGURE): "the orbit is safe without thrust; command acquire first",
     (Mode.SAFE, Trigger.TO_AVOID): "the orbit is safe without thrust; command acquire or standby",
 }
 """Why a command is refused in a mode; every command has a row in one of both tables."""

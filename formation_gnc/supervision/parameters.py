@@ -20,6 +20,11 @@ class SupervisorParameters(ModuleParameters):
         in_flight=True,
         doc="mode of the satellite; set in flight, a command, which may be refused. It follows the mode in force",
     )
+    enabled: bool = parameter(
+        True,
+        in_flight=True,
+        doc="whether faults are looked for and answered; without, the mode changes by command and event alone",
+    )
     false_alarm: float = parameter(
         1e-3,
         above=0.0,

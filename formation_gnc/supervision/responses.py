@@ -16,12 +16,17 @@ class ActiveResponse:
     response: Response
     """That of the entry, or `warn` in a mode in which the entry does not hold."""
 
+    @property
+    def cause(self) -> str:
+        """Monitor and subject."""
+        return f"{self.entry.monitor} {self.subject}".strip()
+
     def __str__(self) -> str:
         """One line for people."""
         words = [self.response, self.entry.mode or "", ", ".join(self.entry.laws)]
         what = " ".join(filter(None, words if self.response is self.entry.response else [self.response]))
         reason = "" if self.response is self.entry.response else f" ({self.entry.response} does not hold in this mode)"
-        return f"{self.entry.monitor} {self.subject}".strip() + f": {what}{reason}"
+        return f"{self.cause}: {what}{reason}"
 
 
 @dataclass(slots=True)
@@ -71,9 +76,12 @@ class FaultResponses:
         for (place, subject), case in sorted(self._cases.items(), key=lambda item: item[0]):
             if case.is_active:
                 entry = self._table[place]
-                active.append(ActiveResponse(entry, subject, entry.response if mode in entry.modes else Response.WARN))
+                holds = mode in entry.modes or mode is entry.mode
+                active.append(ActiveResponse(entry, subject, entry.response if holds else Response.WARN))
         return active
 
-    def clear(self) -> None:
-        """End all responses, by command."""
-        self._cases.clear()
+    def release(self) -> None:
+        """End the responses that a command ends, where the fault is over."""
+        self._cases = {
+            key: case for key, case in self._cases.items() if case.failed or self._table[key[0]].returns != FOREVER
+        }

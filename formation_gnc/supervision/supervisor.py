@@ -1,25 +1,48 @@
 """Supervision of one deputy, from the records of a tick to its mode and health."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
 
 from formation_gnc.common import ANY_ORBIT
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.flight.module import Configuration, FlightModule
+from formation_gnc.flight.module import Condition, Configuration, FlightModule
+from formation_gnc.mode_records import (
+    NO_FORCE,
+    HealthReport,
+    Mode,
+    ModeState,
+    MonitorStatus,
+    Restriction,
+    RestrictionKind,
+)
 from formation_gnc.parameters import change
 from formation_gnc.records import Estimate, EstimateStatus, EventKind, Measurement, Status, Target, Thrust
 from formation_gnc.sensors.registry import sensors
 from formation_gnc.supervision.fault_table import DEFAULT, Entry, Response, parse, table_of
 from formation_gnc.supervision.health import Health
-from formation_gnc.supervision.modes import COMMANDS, FAULTS, Mode, Step, Trigger, refusal, step
+from formation_gnc.supervision.modes import COMMANDS, FAULTS, Step, Trigger, refusal, step
 from formation_gnc.supervision.monitor import AXES, Level, Verdict
 from formation_gnc.supervision.parameters import SupervisorParameters
-from formation_gnc.supervision.records import HealthReport, ModeState, MonitorStatus
 from formation_gnc.supervision.registry import MONITORS
 from formation_gnc.supervision.responses import ActiveResponse, FaultResponses
+from formation_gnc.supervision.safe import Evasion, plan_evasion
 
 LEFT = 1.5
 """Control error, over the tube, beyond which the target counts as left."""
+
+QUIET = 60
+"""Ticks without a failure after which the next one is reported again."""
+
+EVASIVE = frozenset({Mode.AVOID, Mode.SAFE})
+"""Modes that begin with a plan."""
+
+RESTRICTIONS = {
+    Response.ISOLATE_SENSOR: RestrictionKind.SENSOR,
+    Response.ISOLATE_AXIS: RestrictionKind.AXIS,
+    Response.SWITCH_LAW: RestrictionKind.LAW,
+}
+"""What modules do without, by response."""
 
 type Design = tuple[Entry, ...]
 
@@ -28,9 +51,12 @@ _decide = cache(step)
 
 
 class Supervisor(FlightModule[SupervisorParameters, Design]):
-    """Mode and health of one deputy. What it says at a tick holds from the next one on.
+    """Mode and health of one deputy, at every tick that has a measurement, whatever the other modules do.
 
-    The parameter `mode` is a command when it is set, and follows the mode in force otherwise.
+    At a tick it judges the one before, whose records are complete then: a module that has not answered it is
+    known by the acquisition fix of the measurement. What it says holds from the next tick on. The parameter `mode`
+    is a command when it is set, and follows the mode in force otherwise. One that is started again in flight goes
+    on with the mode that the controller obeys.
     """
 
     def reset(self) -> None:
@@ -39,8 +65,16 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         self._health = Health(self.parameters)
         self._responses = FaultResponses(self.configuration.design)
         self._active: list[ActiveResponse] = []
+        self._restrictions: list[Restriction] = []
+        self._failed: dict[tuple[str, str], int] = {}
+        """Time (ns) of the latest failure by monitor and subject."""
+        self._statuses: list[tuple[str, str, Level]] | None = None
         self._command: Trigger | None = None
-        self._last = -1
+        self._evasion: Evasion | None = None
+        self._reason, self._since = "", 0
+        self._in_force = self._mode
+        """Mode over the tick before."""
+        self._before: Measurement | None = None
 
     def design(self, parameters: SupervisorParameters) -> Design:
         """The fault table; raises ConfigurationError for one that is not allowed."""
@@ -54,6 +88,14 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
     def check_due(self, time: int, due: Configuration[SupervisorParameters, Design]) -> None:
         """Refuse a mode that may not be commanded at its tick."""
         self._check_command(due)
+
+    def first_of(self, waiting: Sequence[Measurement]) -> Measurement:
+        """The first: nothing waits for it in the same tick, so that it may be behind, and every tick has a mode."""
+        return waiting[0]
+
+    def has_delayed_inputs(self, pacing: Measurement) -> bool:
+        """Whether the tick before was answered: an acquisition fix comes when it was not."""
+        return not pacing.fix_available
 
     def _check_command(self, wanted: Configuration[SupervisorParameters, Design]) -> None:
         if "mode" not in wanted.changes:
@@ -70,8 +112,11 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         """Take a command; begin anew with other monitors or another table."""
         if "mode" in new.changes and new.parameters.mode != self._mode:
             self._command = COMMANDS[Mode(new.parameters.mode)]
-        if new.design != old.design:
+            self._responses.release()
+        if new.design != old.design or "enabled" in new.changes:
             self._responses = FaultResponses(new.design)
+            self._report(self.time, [])
+            self._active, self._restrictions = [], []
         if new.changes.keys() - {"mode", "fault_table", "schedule"}:
             self._health = Health(new.parameters)
 
@@ -82,94 +127,159 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         target: Target | None = None,
         status: Status | None = None,
         thrust: Thrust | None = None,
-    ) -> tuple[ModeState, HealthReport] | None:
-        """Mode and health at the measurement's stamp; None for a measurement that is out of order.
+    ) -> tuple[ModeState | None, HealthReport | None]:
+        """Mode at the measurement's stamp, and health where it has changed; neither for a measurement out of order.
 
-        A measurement of an earlier time begins a new run if it has an acquisition fix.
+        The other records are of the tick before, each None where there is none. A measurement of an earlier time
+        begins a new run if it has an acquisition fix.
         """
-        time = measurement.time
-        if time == self._last or (time < self._last and not measurement.fix_available):
-            return None
+        time, before = measurement.time, self._before
+        if before is not None and (time == before.time or (time < before.time and not measurement.fix_available)):
+            return None, None
         self.begin_tick(time)
-        ticks = 1 if self._last < 0 else max(1, (time - self._last) // self.parameters.tick_ns)
-        self._last = time
-        self._health.feed(time, self._mode, measurement, estimate, target, status, thrust)
-        notable = self._health.notable()
-        failures = [(each.monitor, each.subject) for each in notable if each.level is Level.FAILED]
-        active = self._responses.evaluate(failures, ticks, self._mode)
-        self._report(time, active)
-        return self._decide(time, estimate, target, active), self._health_report(time, notable, active)
+        before = self._before
+        if before is None and status is not None and status.mode in Mode:
+            self._mode = self._in_force = Mode(status.mode)
+        triggers = self._events(estimate, target)
+        if self.parameters.enabled and (before is not None or estimate is not None):
+            self._judge(time, before, estimate, target, status, thrust)
+        self._before = measurement
+        return self._decide(time, triggers, estimate), self._health_report(time)
 
-    def _decide(
-        self, time: int, estimate: Estimate | None, target: Target | None, active: list[ActiveResponse]
-    ) -> ModeState:
-        triggers, faults = self._events(estimate, target), dict[Trigger, str]()
-        for each in active:
+    def _judge(
+        self,
+        time: int,
+        measurement: Measurement | None,
+        estimate: Estimate | None,
+        target: Target | None,
+        status: Status | None,
+        thrust: Thrust | None,
+    ) -> None:
+        """Feed the monitors with the tick before a time (ns), and update the responses."""
+        tick = self.parameters.tick_ns
+        ticks = 1
+        if measurement is not None and measurement.time != time - tick:
+            ticks, measurement = (time - measurement.time) // tick, None
+        self._health.feed(time - tick, self._in_force, measurement, estimate, target, status, thrust)
+        failures = [each for each in self._health.notable() if each.level is Level.FAILED]
+        for each in failures:
+            key = each.monitor, each.subject
+            if time - self._failed.get(key, -time) > QUIET * tick or key not in self._failed:
+                detail = f"{each.monitor}: {each.statistic:.3g}, where {each.threshold:.3g} is the limit"
+                self.log(time, EventKind.DETECTION, detail, each.subject)
+            self._failed[key] = time
+        active = self._responses.evaluate([(each.monitor, each.subject) for each in failures], ticks, self._mode)
+        if active != self._active:
+            self._report(time, active)
+            self._active = active
+            self._restrictions = list(self._restricted())
+
+    def _decide(self, time: int, triggers: list[Trigger], estimate: Estimate | None) -> ModeState:
+        faults = dict[Trigger, str]()
+        for each in self._active:
             if each.response is Response.GO_TO and each.entry.mode is not None:
-                faults.setdefault(FAULTS[each.entry.mode], f"{each.entry.monitor} {each.subject}".strip())
+                faults.setdefault(FAULTS[each.entry.mode], each.cause)
         if self._command is not None:
             triggers.append(self._command)
         self._command = None
         before, decided = self._mode, _decide(self._mode, (*triggers, *faults))
         for trigger, reason in decided.refusals:
-            self.log(time, EventKind.WARNING, f"{trigger}: refused, {reason}", "mode")
-        reason = ""
+            self.log(time, EventKind.REJECTED, f"{trigger}: {reason}", "mode")
         if decided.mode is not before:
-            reason = self._reason(decided, faults)
-            self._mode = decided.mode
-            self.log(time, EventKind.WARNING, f"{before} to {decided.mode}: {reason}", "mode")
+            self._enter(time, decided, faults, estimate)
+        self._in_force = before
         if self.parameters.mode != self._mode:
             parameters = change(self.parameters, {"mode": str(self._mode)})
             self.configuration = replace(self.configuration, parameters=parameters)
-        return ModeState(time, str(self._mode), str(before), reason)
+        force = NO_FORCE if self._evasion is None else self._evasion.force(time + self.parameters.tick_ns)
+        return ModeState(time, str(self._mode), str(before), self._since, self._reason, force, self._restrictions)
 
-    @staticmethod
-    def _reason(decided: Step, faults: dict[Trigger, str]) -> str:
+    def _enter(self, time: int, decided: Step, faults: dict[Trigger, str], estimate: Estimate | None) -> None:
+        """Go to another mode, from the tick after a time (ns) on."""
+        before, self._mode = self._mode, decided.mode
+        self._since = time + self.parameters.tick_ns
         trigger = decided.trigger
-        return "" if trigger is None else f"{trigger}, {faults[trigger]}" if trigger in faults else str(trigger)
+        self._reason = "" if trigger is None else f"{trigger}, {faults[trigger]}" if trigger in faults else str(trigger)
+        detail = f"from {before}: {self._reason}"
+        self._evasion = None
+        if self._mode in EVASIVE:
+            self._evasion = plan_evasion(self._mode, self._since, estimate, self.parameters)
+            detail += f"; {self._evasion.words}"
+        self.log(time, EventKind.MODE, detail, str(self._mode))
 
     def _events(self, estimate: Estimate | None, target: Target | None) -> list[Trigger]:
-        """Triggers of this tick by the estimate and its control error."""
+        """Triggers by estimate and target of the tick before."""
         if estimate is None:
-            return [Trigger.STATE_LOST]
+            return [] if self._before is None else [Trigger.STATE_LOST]
         triggers = [Trigger.ACQUIRED] if estimate.status == EstimateStatus.ACQUIRED else []
-        if target is not None:
-            dx, dy, dz = (estimate.relative_state[:3] - target.relative_state[:3]).tolist()
-            square, tube = dx * dx + dy * dy + dz * dz, self.parameters.tube
-            if square <= tube * tube:
-                triggers.append(Trigger.TARGET_REACHED)
-            elif not square <= (LEFT * tube) ** 2:  # true for NaN
-                triggers.append(Trigger.TARGET_LEFT)
+        if target is None:
+            return triggers
+        if target.reconfiguring:
+            triggers.append(Trigger.RECONFIGURATION_BEGAN)
+        elif self._mode is Mode.RECONFIGURE:
+            triggers.append(Trigger.RECONFIGURATION_ENDED)
+        dx, dy, dz = (estimate.relative_state[:3] - target.relative_state[:3]).tolist()
+        square, tube = dx * dx + dy * dy + dz * dz, self.parameters.tube
+        if square <= tube * tube:
+            triggers.append(Trigger.TARGET_REACHED)
+        elif not square <= (LEFT * tube) ** 2:  # true for NaN
+            triggers.append(Trigger.TARGET_LEFT)
         return triggers
 
     def _report(self, time: int, active: list[ActiveResponse]) -> None:
-        """Log responses that begin or end."""
-        if active == self._active:
-            return
-        for each in active:
-            if each not in self._active:
-                self.log(time, EventKind.WARNING, str(each), each.subject or each.entry.monitor)
-        for each in self._active:
-            if each not in active:
-                self.log(time, EventKind.WARNING, f"over: {each}", each.subject or each.entry.monitor)
-        self._active = active
+        """Log responses that begin or end; a detection is warning enough."""
+        changes = [("begins", each) for each in active if each not in self._active]
+        changes += [("ends", each) for each in self._active if each not in active]
+        for verb, each in changes:
+            if each.entry.response is not Response.WARN:
+                self.log(time, EventKind.RESPONSE, f"{verb}: {each}", each.subject)
 
-    def _health_report(self, time: int, notable: list[Verdict], active: list[ActiveResponse]) -> HealthReport:
-        statuses = [
-            MonitorStatus(each.monitor, each.subject, int(each.level), each.statistic, each.threshold)
-            for each in notable
-        ]
-        isolated, axes, laws = list[str](), list[str](), list[str]()
-        for each in active:
-            if each.response is Response.ISOLATE_SENSOR and each.subject not in isolated:
-                # The last sensor stays: without any the state would be lost.
-                if len(isolated) + 1 < len(self.parameters.sensors):
-                    isolated.append(each.subject)
-            elif each.response is Response.ISOLATE_AXIS and each.subject not in axes:
-                axes.append(each.subject)
-            elif each.response is Response.SWITCH_LAW:
-                laws += [law for law in each.entry.laws if law not in laws]
-        return HealthReport(time, statuses, isolated, axes, laws)
+    def _restricted(self) -> Iterator[Restriction]:
+        """What modules do without, each once."""
+        known = set[tuple[RestrictionKind, str]]()
+        sensors_left = len(self.parameters.sensors)
+        for each in self._active:
+            kind = RESTRICTIONS.get(each.response)
+            for subject in each.entry.laws or (each.subject,) if kind else ():
+                if kind is None or (kind, subject) in known:
+                    continue
+                if kind is RestrictionKind.SENSOR:
+                    if sensors_left == 1:  # without any the state would be lost
+                        continue
+                    sensors_left -= 1
+                known.add((kind, subject))
+                yield Restriction(str(kind), subject, each.cause)
+
+    def _health_report(self, time: int) -> HealthReport | None:
+        """The verdicts that are not well, where subjects or levels have changed."""
+        notable = self._health.notable() if self.parameters.enabled else []
+        statuses = [(each.monitor, each.subject, each.level) for each in notable]
+        if statuses == self._statuses:
+            return None
+        self._statuses = statuses
+        return HealthReport(
+            time,
+            [
+                MonitorStatus(each.monitor, each.subject, int(each.level), each.statistic, each.threshold)
+                for each in notable
+            ],
+        )
+
+    def conditions(self) -> list[Condition]:
+        """The latest verdict of every monitor: the worst of its subjects, with all of them as values."""
+        by_monitor: dict[str, list[Verdict]] = {name: [] for name in MONITORS}
+        for verdict in self._health.verdicts() if self.parameters.enabled else ():
+            by_monitor[verdict.monitor].append(verdict)
+        return [_condition(name, verdicts) for name, verdicts in by_monitor.items()]
+
+
+def _condition(monitor: str, verdicts: list[Verdict]) -> Condition:
+    values = {each.subject or "statistic": f"{each.statistic:.6g} of {each.threshold:.6g}" for each in verdicts}
+    worst = max((each.level for each in verdicts), default=Level.OK)
+    subjects = [each.subject for each in verdicts if each.level is worst and each.subject]
+    words = {Level.OK: "well", Level.SUSPECT: "suspect", Level.FAILED: "failed"}[worst] if verdicts else "no verdict"
+    message = f"{words}: {', '.join(subjects)}" if subjects and worst is not Level.OK else words
+    return Condition(monitor, int(worst), message, values)
 
 
 def default_fault_table() -> str:

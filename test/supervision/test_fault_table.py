@@ -93,12 +93,19 @@ def test_missed_ticks_count_for_persistence() -> None:
     assert responses.evaluate([("mass", "")], 3, Mode.KEEP)
 
 
-def test_without_a_return_a_response_stays_until_it_is_cleared() -> None:
+def test_without_a_return_a_response_stays_until_it_is_released() -> None:
     responses = table("{monitor: mass, response: warn}")
     responses.evaluate([("mass", "")], 1, Mode.KEEP)
     assert responses.evaluate([], 10_000, Mode.KEEP)
-    responses.clear()
+    responses.release()
     assert not responses.evaluate([], 1, Mode.KEEP)
+
+
+def test_a_response_whose_fault_goes_on_is_not_released() -> None:
+    responses = table("{monitor: mass, response: warn}")
+    responses.evaluate([("mass", "")], 1, Mode.KEEP)
+    responses.release()
+    assert responses.evaluate([], 1, Mode.KEEP)
 
 
 def test_every_subject_of_a_pattern_has_its_own_response() -> None:
