@@ -1,6 +1,6 @@
 """Two-sided cumulative sums of normalised samples (Page 1954)."""
 
-from math import isfinite
+from math import copysign, isfinite
 
 LARGEST = 5.0
 """Samples are cut to so many standard deviations: one outlier alone raises no alarm."""
@@ -22,7 +22,9 @@ class Cusum:
     def add(self, sample: float) -> float:
         """Add a sample, and return the larger sum; one that is not finite counts as no sample."""
         if isfinite(sample):
-            sample = min(max(sample, -LARGEST), LARGEST)
-            self._up = min(max(0.0, self._up + sample - self._reference), self._ceiling)
-            self._down = min(max(0.0, self._down - sample - self._reference), self._ceiling)
-        return max(self._up, self._down)
+            if not -LARGEST <= sample <= LARGEST:
+                sample = copysign(LARGEST, sample)
+            up, down = self._up + sample - self._reference, self._down - sample - self._reference
+            self._up = 0.0 if up < 0.0 else up if up < self._ceiling else self._ceiling
+            self._down = 0.0 if down < 0.0 else down if down < self._ceiling else self._ceiling
+        return self._up if self._up > self._down else self._down

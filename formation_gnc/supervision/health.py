@@ -1,32 +1,42 @@
 """All monitors of a satellite, fed tick by tick."""
 
 from collections.abc import Iterator
-from itertools import product
+from functools import cache
 from math import isfinite
 
-from formation_gnc.records import Estimate, EstimateStatus, Measurement, Status, Target, Thrust
+from formation_gnc.records import Estimate, EstimateStatus, Measurement, Separation, Status, Target, Thrust
 from formation_gnc.supervision.modes import Mode
 from formation_gnc.supervision.monitor import Monitor, Observation, Verdict, When
 from formation_gnc.supervision.parameters import SupervisorParameters
 from formation_gnc.supervision.reckoning import DeadReckoner, Reckoning
 from formation_gnc.supervision.registry import MONITORS
-from formation_gnc.types import NANOSECONDS
+from formation_gnc.supervision.thrust_tally import ThrustTally
+from formation_gnc.types import Vector
+
+_ACQUIRED = int(EstimateStatus.ACQUIRED)
+
+_READINGS, _SLOW, _THRUST, _SEPARATION, _GAP = 1, 2, 4, 8, 16
+"""Values of `When`, as numbers: a tick is one of several kinds."""
 
 
 class Health:
-    """The monitors of a satellite, with what they share: the tick before, and dead reckoning."""
+    """The monitors of a satellite, with what they share: the tally of thrust, and dead reckoning.
+
+    Most ticks bring nothing but a force, which the tally takes. The others are observations, for the monitors that
+    want them.
+    """
 
     def __init__(self, parameters: SupervisorParameters) -> None:
         """All monitors, each with an equal share of the probability of a false alarm."""
         share = parameters.false_alarm / len(MONITORS)
         self.monitors: list[Monitor] = [kind(parameters, share) for kind in MONITORS.values()]
-        kinds = product((False, True), repeat=2)
-        self._fed = {(readings, slow): self._chosen(readings, slow) for readings, slow in kinds}
+        self._fed = cache(self._chosen)
         self._tick_ns = parameters.tick_ns
-        self._reckoner = DeadReckoner(parameters.tick_ns)
+        self._thrust = ThrustTally(parameters, share)
+        self._reckoner = DeadReckoner(parameters.tick_ns, self._thrust.memory)
         self._last: int | None = None
-        self._commanded: list[float] | None = None
-        self._continues = False
+        self._commanded: Vector | None = None
+        self._continues = self._in_eclipse = self._was_suspect = False
 
     def feed(
         self,
@@ -37,6 +47,7 @@ class Health:
         target: Target | None,
         status: Status | None,
         thrust: Thrust | None,
+        separation: Separation | None = None,
     ) -> bool:
         """Feed all monitors; returns whether there was anything new: a time that is not later than the last is ignored.
 
@@ -48,55 +59,66 @@ class Health:
             target: of guidance.
             status: of the controller.
             thrust: commanded for the tick that begins.
+            separation: of guidance, at the ticks at which it predicts.
         """
         last = self._last
         if last is not None and time <= last:
             return False
         self._last = time
-        missed = last is None or time - last > self._tick_ns
-        if missed:
-            self._reckoner.reset()
-        if estimate is not None and not isfinite(sum(estimate.relative_state.tolist())):
-            estimate = None
-        if estimate is None or estimate.status == EstimateStatus.ACQUIRED:
-            self._continues = False
-        applied = None if measurement is None else measurement.applied_force.tolist()
+        missed = 1 if last is None else (time - last) // self._tick_ns - 1
         left = -(time // self._tick_ns) % self._reckoner.ticks
-        slow = left == 0
-        observation = Observation(
-            time,
-            0.0 if last is None else (time - last) / NANOSECONDS,
-            missed,
-            slow,
-            mode,
-            measurement,
-            estimate,
-            target,
-            status,
-            None if missed else self._commanded,
-            applied,
-            self._reckon(measurement, estimate, applied, left),
-        )
-        self._commanded = None if thrust is None else _finite(thrust.force.tolist())
-        readings = bool((measurement and measurement.readings) or (estimate and estimate.innovations))
-        for monitor in self._fed[readings, slow]:
-            monitor.feed(observation)
+        if estimate is None or estimate.status == _ACQUIRED:
+            self._continues = False
+        is_suspect = self._tally(measurement, missed, left)
+        self._commanded = None if thrust is None else thrust.force
+        kinds = _SLOW if left == 0 else 0
+        if (measurement and measurement.readings) or (estimate and estimate.innovations):
+            kinds |= _READINGS
+        if is_suspect or self._was_suspect:
+            kinds |= _THRUST
+        if separation is not None:
+            kinds |= _SEPARATION
+        if missed:
+            kinds |= _GAP
+        self._was_suspect = is_suspect
+        if kinds:
+            if estimate is not None and not isfinite(sum(estimate.relative_state.tolist())):
+                estimate = None
+            reckoning = self._reckon(measurement, estimate) if left == 0 else None
+            observation = Observation(
+                time,
+                missed,
+                left == 0,
+                mode,
+                measurement,
+                estimate,
+                target,
+                status,
+                separation,
+                self._thrust,
+                reckoning,
+            )
+            for monitor in self._fed(kinds):
+                monitor.feed(observation)
         return True
 
-    def _chosen(self, readings: bool, slow: bool) -> list[Monitor]:
-        """Monitors to be fed at a tick with or without readings, slow or not."""
-        due = When.ALWAYS | (When.READINGS if readings else When(0)) | (When.SLOW if slow else When(0))
-        return [each for each in self.monitors if each.when & due]
+    def _chosen(self, kinds: int) -> list[Monitor]:
+        """Monitors to be fed at a tick of these kinds."""
+        return [each for each in self.monitors if each.when & When(kinds)]
 
-    def _reckon(
-        self, measurement: Measurement | None, estimate: Estimate | None, applied: list[float] | None, left: int
-    ) -> Reckoning | None:
-        if measurement is None or applied is None:
+    def _tally(self, measurement: Measurement | None, missed: int, left: int) -> bool:
+        if missed or measurement is None:
             self._reckoner.reset()
-            return None
-        if any(applied) and isfinite(sum(applied)) and 0.0 < measurement.mass < float("inf"):
-            self._reckoner.add_thrust([each / measurement.mass for each in applied], left)
-        if left:
+            self._thrust.interrupt()
+        if measurement is None:
+            self._in_eclipse = False
+            return False
+        is_suspect = self._thrust.add(measurement, None if missed else self._commanded, self._in_eclipse, left)
+        self._in_eclipse = measurement.eclipse
+        return is_suspect
+
+    def _reckon(self, measurement: Measurement | None, estimate: Estimate | None) -> Reckoning | None:
+        if measurement is None:
             return None
         reckoning = self._reckoner.compare(measurement, estimate, self._continues)
         self._continues = estimate is not None
@@ -105,12 +127,8 @@ class Health:
     def verdicts(self) -> Iterator[Verdict]:
         """The latest verdict of every monitor on each of its subjects, in the order of the registry."""
         for monitor in self.monitors:
-            yield from monitor.verdicts.values()
+            yield from monitor.verdicts()
 
     def notable(self) -> list[Verdict]:
         """The latest verdicts that are not well."""
         return [verdict for monitor in self.monitors if monitor.notable for verdict in monitor.notable.values()]
-
-
-def _finite(force: list[float]) -> list[float] | None:
-    return force if isfinite(sum(force)) else None

@@ -4,19 +4,19 @@ from formation_gnc.types import NANOSECONDS
 
 
 class HeldTime:
-    """Time since a condition began to hold, from one look to the next."""
+    """Time since a value became what it is, from one look to the next."""
 
-    __slots__ = ("_since",)
+    __slots__ = ("_since", "_value")
 
     def __init__(self) -> None:
         """Not held."""
-        self._since: int | None = None
+        self._value, self._since = 0, 0
 
-    def look(self, time: int, holds: bool) -> float:
-        """Time (s) at a stamp (ns) since the first look in a row at which it held; 0 where it does not."""
-        if not holds:
-            self._since = None
+    def look(self, time: int, value: int) -> float:
+        """Time (s) at a stamp (ns) since the first look in a row at this value; 0 for the value 0, and for False."""
+        if not value:
+            self._value = 0
             return 0.0
-        if self._since is None:
-            self._since = time
+        if value != self._value:
+            self._value, self._since = value, time
         return (time - self._since) / NANOSECONDS

@@ -1,19 +1,17 @@
 """What a health monitor is: fed one observation a tick, it returns its verdicts."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import Flag, IntEnum, auto
 from math import inf, isnan
 from typing import ClassVar
 
-from formation_gnc.records import Estimate, Measurement, Status, Target
+from formation_gnc.records import Estimate, Measurement, Separation, Status, Target
 from formation_gnc.supervision.modes import Mode
 from formation_gnc.supervision.parameters import SupervisorParameters
 from formation_gnc.supervision.reckoning import Reckoning
-
-SUSPICION = 100.0
-"""Suspicion is raised so many times as often as a failure, without a fault."""
+from formation_gnc.supervision.thrust_tally import ThrustTally
 
 AXES = ("x", "y", "z")
 """Hill axes, as subjects."""
@@ -34,7 +32,12 @@ class When(Flag):
     """Those with readings or innovations."""
     SLOW = auto()
     """Every tenth, or one in two minutes: for what changes slowly."""
-    ALWAYS = auto()
+    THRUST = auto()
+    """Those at which the sum of a thruster is suspect, and the first one at which it is no more."""
+    SEPARATION = auto()
+    """Those at which guidance has predicted separations."""
+    GAP = auto()
+    """The first one, and those after ticks that were not observed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,10 +59,8 @@ class Observation:
 
     time: int
     """Stamp, ns."""
-    seconds: float
-    """Since the observation before, s; 0 for the first one."""
-    missed: bool
-    """Whether there were ticks in between that were not observed, or this is the first one."""
+    missed: int
+    """Ticks before this one that were not observed; 1 at the first one."""
     slow: bool
     """Whether this is a tick of `When.SLOW`."""
     mode: Mode
@@ -69,10 +70,10 @@ class Observation:
     """None as well where its numbers are not finite."""
     target: Target | None
     status: Status | None
-    commanded: list[float] | None
-    """Force (3,) commanded for the tick that has ended, Hill frame, N; None where it is not known."""
-    applied: list[float] | None
-    """Force (3,) applied over that tick, by telemetry."""
+    separation: Separation | None
+    """Predicted by guidance, at some ticks."""
+    thrust: ThrustTally
+    """Of all ticks so far."""
     reckoning: Reckoning | None
     """Comparison of ephemeris and estimate with their own propagation, at slow ticks."""
 
@@ -100,10 +101,10 @@ class Monitor(ABC):
             probability: of a false alarm of this monitor in the whole flight.
         """
         self.parameters, self.probability = parameters, probability
-        self.verdicts: dict[str, Verdict] = {}
-        """The latest one of each subject."""
         self.notable: dict[str, Verdict] = {}
-        """Those that are not well."""
+        """The latest verdicts that are not well, by subject."""
+        self._well: dict[str, tuple[float, float]] = {}
+        """Statistic and threshold of those that are: no object is built for them at every tick."""
         self.prepare()
 
     def prepare(self) -> None:  # noqa: B027 - optional
@@ -120,21 +121,22 @@ class Monitor(ABC):
 
     def judge(self, subject: str, statistic: float, suspect: float, failed: float) -> None:
         """Set the verdict on a subject; a statistic that is not a number is a failure."""
-        if isnan(statistic):
-            statistic = inf
-        level = Level.FAILED if statistic >= failed else Level.SUSPECT if statistic >= suspect else Level.OK
-        verdict = self.verdicts[subject] = Verdict(self.name, subject, level, statistic, failed)
-        if level is not Level.OK:
-            self.notable[subject] = verdict
-        elif self.notable:
-            self.notable.pop(subject, None)
+        if statistic < suspect:
+            self._well[subject] = statistic, failed
+            if self.notable:
+                self.notable.pop(subject, None)
+            return
+        level = Level.SUSPECT if statistic < failed else Level.FAILED
+        self._well.pop(subject, None)
+        self.notable[subject] = Verdict(self.name, subject, level, inf if isnan(statistic) else statistic, failed)
 
     def forget(self, subject: str) -> None:
         """Take back the verdict on a subject that is not watched any more."""
-        self.verdicts.pop(subject, None)
+        self._well.pop(subject, None)
         self.notable.pop(subject, None)
 
-
-def suspicion(probability: float) -> float:
-    """Probability that a flight without a fault raises a suspicion, given that of a failure."""
-    return min(0.5, SUSPICION * probability)
+    def verdicts(self) -> Iterator[Verdict]:
+        """The latest one on each subject."""
+        for subject, (statistic, threshold) in self._well.items():
+            yield Verdict(self.name, subject, Level.OK, statistic, threshold)
+        yield from self.notable.values()

@@ -10,6 +10,7 @@ from formation_gnc.supervision.monitors.frozen_readings import FrozenReadings
 from formation_gnc.supervision.monitors.innovation_consistency import InnovationConsistency
 from formation_gnc.supervision.monitors.innovation_shift import InnovationBias, InnovationDrift
 from formation_gnc.supervision.monitors.mass import Mass
+from formation_gnc.supervision.monitors.residual_acceleration import ResidualAcceleration
 from formation_gnc.supervision.monitors.saturation import Saturation
 from formation_gnc.supervision.monitors.solver_fallback import SolverFallback
 from formation_gnc.supervision.monitors.thrust_response import ThrustResponse
@@ -23,6 +24,7 @@ MONITORS: dict[str, type[Monitor]] = {
     "dropout": Dropout,
     "covariance": Covariance,
     "estimate_jump": EstimateJump,
+    "residual_acceleration": ResidualAcceleration,
     "chief_ephemeris": ChiefEphemeris,
     "thrust_response": ThrustResponse,
     "thruster_on": ThrusterOn,

@@ -6,6 +6,9 @@ from math import expm1, log, sqrt
 from scipy.optimize import brentq
 from scipy.special import chdtri, ndtri
 
+SUSPICION = 100.0
+"""Suspicion is raised so many times as often as a failure, without a fault."""
+
 OVERSHOOT = 1.166
 """Mean excess over a boundary of a normal random walk, twice over, in standard deviations (Siegmund 1985)."""
 
@@ -50,16 +53,20 @@ def normal_threshold(samples: int, probability: float) -> float:
 
 
 @cache
-def chi_square_band(freedom: int, samples: int, probability: float) -> tuple[float, float]:
-    """Least and greatest chi-square that any of a number of samples leaves with a probability at most."""
-    tail = 0.5 * probability / max(1, samples)
-    return float(chdtri(freedom, 1.0 - tail)), float(chdtri(freedom, tail))
+def chi_square_limit(freedom: int, samples: int, probability: float) -> float:
+    """Chi-square that any of a number of samples exceeds with a probability at most."""
+    return float(chdtri(freedom, probability / max(1, samples)))
 
 
 @cache
 def repeats(chance: float, samples: int, probability: float) -> int:
     """Length of a run, each with a chance, that begins at any of a number of samples with a probability at most."""
     return max(2, -int(log(probability / max(1, samples)) // -log(chance)) if chance < 1.0 else samples)
+
+
+def suspicion(probability: float) -> float:
+    """Probability that a flight without a fault raises a suspicion, given that of a failure."""
+    return min(0.5, SUSPICION * probability)
 
 
 def standard_deviations(variances: list[float]) -> list[float]:

@@ -1,14 +1,20 @@
 """A control error that grows although thrust is free."""
 
-from math import inf, isfinite, tau
+from math import dist, inf, isfinite, tau
 
 from formation_gnc.records import EstimateStatus
 from formation_gnc.supervision.modes import Mode
 from formation_gnc.supervision.monitor import Monitor, Observation
 from formation_gnc.types import NANOSECONDS
 
+UNCONTROLLED = "coast"
+"""Law that does nothing about an error."""
+
 FACTOR = 2.0
 """Of the tube: an error that has been within it does not come to this without a fault."""
+
+JUDGED = (Mode.KEEP, Mode.ACQUIRE)
+"""Modes in which the error is judged."""
 
 WINDOW = 0.125
 """Length of a window, revolutions."""
@@ -20,8 +26,8 @@ GROWING = 4
 class ControlError(Monitor):
     """Distance of estimate and target: out of the tube again once it was in, or growing window by window.
 
-    Not judged while the controller is saturated or on a fallback, after a change of formation, and in other modes than
-    `keep` and `acquire`.
+    Not judged while the controller is saturated, on a fallback or told to coast, after a change of formation, and in
+    other modes than `keep` and `acquire`.
 
     Assumes: a tube that the law holds without a fault, noise of the estimate included; the error of a law on its way to
     the target swings out by less than half a revolution.
@@ -47,17 +53,18 @@ class ControlError(Monitor):
     def feed(self, observation: Observation) -> None:
         """Judge the error."""
         estimate, target, status = observation.estimate, observation.target, observation.status
-        if estimate is None or target is None or observation.mode not in (Mode.KEEP, Mode.ACQUIRE):
+        is_controlled = status is not None and status.algorithm != UNCONTROLLED
+        if estimate is None or target is None or not is_controlled or observation.mode not in JUDGED:
             self._restart(False)
+            self.forget("")
             return
         if target.formation != self._formation or estimate.status == EstimateStatus.ACQUIRED:
             self._formation = target.formation
             self._restart(False)
-        dx, dy, dz = (estimate.relative_state[:3] - target.relative_state[:3]).tolist()
-        error = (dx * dx + dy * dy + dz * dz) ** 0.5
+        error = dist(estimate.relative_state.tolist()[:3], target.relative_state.tolist()[:3])
         if not isfinite(error):
             return
-        if status is None or status.fallback or any(status.saturated):
+        if status is None or status.fallback or True in status.saturated:
             self._restart(self._reached)
         tube = self.parameters.tube
         self._reached |= error <= tube

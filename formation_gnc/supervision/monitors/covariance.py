@@ -31,6 +31,6 @@ class Covariance(Monitor):
         if factor is None:
             self.forget("")
             return
-        largest = max(standard_deviations(observation.estimate.covariance.diagonal()[:3].tolist()))
+        largest = max(standard_deviations(observation.estimate.covariance.diagonal().tolist()[:3]))
         limit = factor * self.parameters.largest_sigma
         self.judge("", largest, 0.5 * limit, limit)

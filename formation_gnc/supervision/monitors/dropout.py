@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite, log
 
-from formation_gnc.supervision.monitor import Monitor, Observation, When, suspicion
+from formation_gnc.supervision.monitor import Monitor, Observation, When
 from formation_gnc.supervision.parameters import SupervisorParameters
+from formation_gnc.supervision.thresholds import suspicion
 from formation_gnc.types import NANOSECONDS
 
 PRIOR_MISSED, PRIOR_DUE = 1.0, 5.0
@@ -23,6 +24,8 @@ class _Rhythm:
     last: int
     interval: int = 0
     """Least time between two readings, ns."""
+    has_gap: bool = False
+    """Whether there were ticks since that were not observed."""
     due: float = PRIOR_DUE
     missed: float = PRIOR_MISSED
 
@@ -40,7 +43,7 @@ class Dropout(Monitor):
     name = "dropout"
     title = "missing readings in a row"
     test = "intervals without a finite reading; the chance of a miss is the sensor's own so far"
-    when = When.READINGS | When.SLOW
+    when = When.READINGS | When.SLOW | When.GAP
 
     def prepare(self) -> None:
         """Probabilities of each sensor in use."""
@@ -59,16 +62,19 @@ class Dropout(Monitor):
         """Take the readings of a tick, and judge the silence of each sensor at slow ticks."""
         if self._start is None:
             self._start = observation.time
+        if observation.missed:
+            for rhythm in self._rhythms.values():
+                rhythm.has_gap = True
         measurement = observation.measurement
         if measurement is not None and measurement.readings:
             for reading in measurement.readings:
-                if reading.sensor in self.parameters.sensors and all(map(isfinite, reading.values)):
-                    self._take(reading.sensor, measurement.time - reading.age, observation.missed)
+                if reading.sensor in self.parameters.sensors and isfinite(sum(reading.values)):
+                    self._take(reading.sensor, measurement.time - reading.age)
         if observation.slow:
             for name in self.parameters.sensors:
                 self._judge_silence(name, observation.time)
 
-    def _take(self, name: str, taken: int, missed: bool) -> None:
+    def _take(self, name: str, taken: int) -> None:
         rhythm = self._rhythms.get(name)
         if rhythm is None:
             self._rhythms[name] = _Rhythm(taken)
@@ -76,12 +82,12 @@ class Dropout(Monitor):
         gap = taken - rhythm.last
         if gap <= 0:
             return
-        if not missed:  # else it may have read at a tick that was not observed
+        if not rhythm.has_gap:  # else it may have read at a tick that was not observed
             rhythm.interval = min(gap, rhythm.interval or gap)
             due = min(gap / rhythm.interval, LONGEST)
             rhythm.due += due
             rhythm.missed += due - 1.0
-        rhythm.last = taken
+        rhythm.last, rhythm.has_gap = taken, False
 
     def _judge_silence(self, name: str, time: int) -> None:
         rhythm = self._rhythms.get(name)
@@ -90,6 +96,9 @@ class Dropout(Monitor):
             silence = (time - (since or 0)) / NANOSECONDS
             self.judge(name, silence / NEVER, 0.5, 1.0)
             return
+        silent = (time - rhythm.last) / rhythm.interval - 1.0
+        if silent <= 0.0:
+            self.judge(name, 0.0, 1.0, 2.0)
+            return
         chance = log(min(0.5, rhythm.missed / rhythm.due))
-        silent = max(0.0, (time - rhythm.last) / rhythm.interval - 1.0)
         self.judge(name, silent, max(1.0, self._suspect / chance), max(2.0, self._failed / chance))

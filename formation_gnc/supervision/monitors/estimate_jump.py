@@ -1,7 +1,7 @@
 """Estimates that do not follow from the one before."""
 
-from formation_gnc.supervision.monitor import Monitor, Observation, suspicion
-from formation_gnc.supervision.thresholds import normal_threshold
+from formation_gnc.supervision.monitor import Monitor, Observation
+from formation_gnc.supervision.thresholds import normal_threshold, suspicion
 
 
 class EstimateJump(Monitor):

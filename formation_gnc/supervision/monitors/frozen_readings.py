@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from formation_gnc.supervision.monitor import Monitor, Observation, When, suspicion
+from formation_gnc.supervision.monitor import Monitor, Observation, When
 from formation_gnc.supervision.parameters import SupervisorParameters
-from formation_gnc.supervision.thresholds import repeats
+from formation_gnc.supervision.thresholds import repeats, suspicion
 
 RESOLUTION = 1e-3
 """Largest resolution of a sensor, over its noise; so likely is an exact repeat, at most."""

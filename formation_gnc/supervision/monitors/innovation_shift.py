@@ -1,12 +1,13 @@
 """Innovations whose mean is not zero: a sensor's bias or drift, or an error of the state."""
 
 from collections.abc import Sequence
+from math import nan
 from typing import ClassVar
 
 from formation_gnc.supervision.cusum import Cusum
-from formation_gnc.supervision.monitor import Monitor, Observation, When, suspicion
+from formation_gnc.supervision.monitor import Monitor, Observation, When
 from formation_gnc.supervision.parameters import SupervisorParameters
-from formation_gnc.supervision.thresholds import cusum_threshold
+from formation_gnc.supervision.thresholds import cusum_threshold, suspicion
 
 
 class InnovationShift(Monitor):
@@ -44,7 +45,9 @@ class InnovationShift(Monitor):
                 sums = self._sums[each.sensor] = [Cusum(self.reference, self._failed) for _ in each.values]
             largest = 0.0
             for cusum, value, sigma in zip(sums, each.values, each.standard_deviations, strict=False):
-                largest = max(largest, cusum.add(value / sigma if sigma > 0.0 else float("nan")))
+                total = cusum.add(value / sigma if sigma > 0.0 else nan)
+                if total > largest:
+                    largest = total
             self.judge(each.sensor, largest, self._suspect, self._failed)
 
 

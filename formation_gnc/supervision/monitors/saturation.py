@@ -28,5 +28,5 @@ class Saturation(Monitor):
         """Look at the status."""
         status = observation.status
         if status is not None:
-            held = self._held.look(observation.time, any(status.saturated))
+            held = self._held.look(observation.time, True in status.saturated)
             self.judge("", held / ((0.5 if observation.mode is Mode.KEEP else 2.0) * self._period), 0.5, 1.0)

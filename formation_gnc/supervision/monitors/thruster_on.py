@@ -28,8 +28,7 @@ class ThrusterOn(Monitor):
         """All off."""
         self._period = tau / self.parameters.mean_motion
         self._floors = [TOLERANCE * each for each in self.parameters.thrust_limit]
-        self._held = [(HeldTime(), HeldTime()) for _ in AXES]
-        """Of each axis, to either side."""
+        self._held = [HeldTime() for _ in AXES]
 
     @classmethod
     def subjects(cls, parameters: SupervisorParameters) -> Sequence[str]:
@@ -38,9 +37,10 @@ class ThrusterOn(Monitor):
 
     def feed(self, observation: Observation) -> None:
         """Look at the applied force: a pause in between is not seen, one that lasts is."""
-        if observation.applied is None:
+        if observation.measurement is None:
             return
         limit = (0.5 if observation.mode is Mode.KEEP else 2.0) * self._period
-        for axis, force, floor, (up, down) in zip(AXES, observation.applied, self._floors, self._held, strict=True):
-            held = max(up.look(observation.time, force > floor), down.look(observation.time, force < -floor))
-            self.judge(axis, held / limit, 0.5, 1.0)
+        applied = observation.measurement.applied_force.tolist()
+        for axis, force, floor, held in zip(AXES, applied, self._floors, self._held, strict=True):
+            side = 1 if force > floor else -1 if force < -floor else 0
+            self.judge(axis, held.look(observation.time, side) / limit, 0.5, 1.0)
