@@ -73,6 +73,13 @@ DEFAULT = (
     "{monitor: control_error, persistence: 60, response: go_to, mode: safe, modes: [keep, acquire]}",
     "{monitor: saturation, persistence: 1, response: warn, return: 60}",
     "{monitor: solver_fallback, persistence: 1, response: switch_law, laws: [lqr, coast]}",
+    "{monitor: residual_acceleration, persistence: 1, response: warn, return: 60}",
+    "{monitor: propellant, persistence: 1, response: warn, return: 60}",
+    "{monitor: separation, subject: planned, persistence: 1, response: go_to, mode: avoid, return: 60}",
+    "{monitor: separation, subject: passive, persistence: 1, response: warn, return: 60}",
+    "{monitor: neighbours, persistence: 1, response: warn, return: 60}",
+    "{monitor: heartbeat, persistence: 1, response: warn, return: 60}",
+    "{monitor: cycle_slips, persistence: 1, response: warn, return: 60}",
 )
 """Sensors and axes that can be told apart are taken out; what cannot be trusted or held ends in `safe`."""
 

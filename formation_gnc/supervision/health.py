@@ -11,12 +11,15 @@ from formation_gnc.supervision.parameters import SupervisorParameters
 from formation_gnc.supervision.reckoning import DeadReckoner, Reckoning
 from formation_gnc.supervision.registry import MONITORS
 from formation_gnc.supervision.thrust_tally import ThrustTally
-from formation_gnc.types import Vector
+from formation_gnc.types import NANOSECONDS, Vector
 
 _ACQUIRED = int(EstimateStatus.ACQUIRED)
 
-_READINGS, _SLOW, _THRUST, _SEPARATION, _GAP = 1, 2, 4, 8, 16
-"""Values of `When`, as numbers: a tick is one of several kinds."""
+_READINGS, _SLOW, _RARE, _THRUST, _SEPARATION, _GAP = (each.value for each in When)
+"""Kinds of ticks, as numbers: a tick may be of several."""
+
+RARE = 60.0
+"""Time between rare ticks, s, and at least that between slow ones."""
 
 
 class Health:
@@ -34,6 +37,9 @@ class Health:
         self._tick_ns = parameters.tick_ns
         self._thrust = ThrustTally(parameters, share)
         self._reckoner = DeadReckoner(parameters.tick_ns, self._thrust.memory)
+        slow = self._reckoner.ticks
+        self._rare = slow * max(1, round(RARE * NANOSECONDS / (slow * parameters.tick_ns)))
+        """Ticks between rare ones."""
         self._last: int | None = None
         self._commanded: Vector | None = None
         self._continues = self._in_eclipse = self._was_suspect = False
@@ -66,12 +72,13 @@ class Health:
             return False
         self._last = time
         missed = 1 if last is None else (time - last) // self._tick_ns - 1
-        left = -(time // self._tick_ns) % self._reckoner.ticks
+        tick = time // self._tick_ns
+        left = -tick % self._reckoner.ticks
         if estimate is None or estimate.status == _ACQUIRED:
             self._continues = False
         is_suspect = self._tally(measurement, missed, left)
         self._commanded = None if thrust is None else thrust.force
-        kinds = _SLOW if left == 0 else 0
+        kinds = 0 if left else _SLOW if tick % self._rare else _SLOW | _RARE
         if (measurement and measurement.readings) or (estimate and estimate.innovations):
             kinds |= _READINGS
         if is_suspect or self._was_suspect:

@@ -29,10 +29,10 @@ LONGEST = 3000.0
 STEP = 15.0
 """Longest integration step, s: in low orbit an error of a millimetre in fifty minutes."""
 
-SUMS, BEFORE, SPEED, SHIFT, BURNED, KNOWN, TALLY = 0, 3, 6, 9, 12, 13, 14
+SUMS, BEFORE, SPEED, SHIFT, BURNED, KNOWN, TURN, TALLY = 0, 3, 6, 9, 12, 13, 14, 15
 """Places in the memory of `tally`: sums (3,) of differences over their limit; force (3,) commanded before, N; speed and
-shift (3,) by thrust since the last comparison, m/s and m; propellant burned, kg; whether a command before is known;
-their number."""
+shift (3,) by thrust since the last comparison, in the Hill frame of the next one, m/s and m; propellant burned, kg;
+whether a command before is known; rate of the Hill frame, rad/s; their number."""
 
 LIMIT, ALLOWED, SCALE, TOTAL, ECLIPSE, SUSPECT, CEILING, PER_IMPULSE, RATE, TALLY_SETTINGS = 0, 3, *range(6, 14)
 """Places in the settings of `tally`: limit (3,), N; allowed difference (3,) over it, and over the command; limit of the
@@ -71,10 +71,10 @@ def tally(
         total = sqrt(x * x + y * y + z * z) if settings[TOTAL] > 0.0 else abs(x) + abs(y) + abs(z)
         memory[BURNED] += min(total * settings[PER_IMPULSE], settings[RATE]) * tick
         if 0.0 < mass < inf:
-            for axis in range(3):
-                speed = applied[axis] / mass * tick
-                memory[SPEED + axis] += speed
-                memory[SHIFT + axis] += speed * after
+            c, s, impulse = cos(memory[TURN] * after), sin(memory[TURN] * after), tick / mass
+            for axis, force in enumerate((c * x + s * y, c * y - s * x, z)):
+                memory[SPEED + axis] += force * impulse
+                memory[SHIFT + axis] += force * impulse * after
     if not (is_known and isfinite(commanded[0] + commanded[1] + commanded[2])):
         memory[KNOWN] = 0.0
         return False
@@ -183,13 +183,14 @@ def _compare_track(
 ) -> None:
     """Difference of a relative state from a track, which moves on, in standard deviations of the latter."""
     chief, deputy = track[:6], track[6:12]
-    axes, rate = hill_frame(chief)
+    _, rate = hill_frame(chief)
+    _advance(chief, 0.0, 0.0, 0.0, seconds, steps)
+    axes, _ = hill_frame(chief)
     ax, ay, az = 0.0, 0.0, 0.0
     for i in range(3):
         ax += mean[3 + i] * axes[i, 0] / seconds
         ay += mean[3 + i] * axes[i, 1] / seconds
         az += mean[3 + i] * axes[i, 2] / seconds
-    _advance(chief, 0.0, 0.0, 0.0, seconds, steps)
     _advance(deputy, ax, ay, az, seconds, steps)
     for c in range(3):  # the mean of the thrust is in the propagation
         for i in range(3):
@@ -261,7 +262,8 @@ def reckon(
         tracks: (N, 13) propagated estimates: chief and deputy, inertial, and time, s; changed. Time below 0 for none.
         covariances: (N, 6, 6) of these; changed.
         lengths: (N,) time after which each starts anew, s.
-        memory: of `tally`: speed and shift by thrust since the last comparison, which are cleared.
+        memory: of `tally`: speed and shift by thrust since the last comparison, which are cleared, and the rate of the
+            Hill frame, which is set.
         out: (2 + 6 N,) ratio and time of the ephemeris, and differences of the relative state from each track, in
             standard deviations.
 
@@ -273,6 +275,9 @@ def reckon(
     for i in range(3):
         mean[i], mean[3 + i] = memory[SHIFT + i], memory[SPEED + i]
         memory[SHIFT + i] = memory[SPEED + i] = 0.0
+    _, rate = hill_frame(ephemeris)
+    if isfinite(rate):
+        memory[TURN] = rate
     given = 0
     if anchors[0, 6] >= 0.0:
         out[0] = out[1] = 0.0

@@ -31,7 +31,9 @@ class When(Flag):
     READINGS = auto()
     """Those with readings or innovations."""
     SLOW = auto()
-    """Every tenth, or one in two minutes: for what changes slowly."""
+    """Every tenth, or one in two minutes, at which there is a comparison."""
+    RARE = auto()
+    """Those of the slow ones that are about a minute apart: for what changes within much of a revolution."""
     THRUST = auto()
     """Those at which the sum of a thruster is suspect, and the first one at which it is no more."""
     SEPARATION = auto()

@@ -56,6 +56,14 @@ class SupervisorParameters(ModuleParameters):
         doc="largest standard deviation of the position on any axis while the formation is kept or reconfigured; "
         "ten times of it while it is acquired",
     )
+    least_separation: float = parameter(
+        0.0,
+        unit="m",
+        minimum=0.0,
+        maximum=1e6,
+        in_flight=True,
+        doc="least distance to any other satellite, predicted with its uncertainty; 0 for none",
+    )
     fault_table: tuple[str, ...] = parameter(
         DEFAULT,
         in_flight=True,

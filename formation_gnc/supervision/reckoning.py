@@ -34,8 +34,7 @@ class Reckoning:
 class DeadReckoner:
     """Propagates chief and deputy under the point mass with J2 and the applied thrust, from comparison to comparison.
 
-    Thrust enters by its mean over the interval and, to first order, by when it came. What is left is the turn of the
-    axes meanwhile: a tenth, over a hundred seconds in low orbit, of what the thrust has moved.
+    Thrust enters by its mean over the interval, by when it came to first order, and turned with the axes meanwhile.
     """
 
     def __init__(self, tick_ns: int, thrust: Vector) -> None:
@@ -43,7 +42,8 @@ class DeadReckoner:
 
         Args:
             tick_ns: of the run, ns.
-            thrust: memory of `kernels.tally`, which it reads and clears of the thrust since the last comparison.
+            thrust: memory of `kernels.tally`: it takes the thrust since the last comparison from it, and gives it the
+                rate of the Hill frame.
         """
         self.ticks = min(max(1, round(INTERVAL * NANOSECONDS / tick_ns)), TICKS)
         """Between comparisons."""

@@ -7,11 +7,15 @@ from formation_gnc.supervision.monitors.covariance import Covariance
 from formation_gnc.supervision.monitors.dropout import Dropout
 from formation_gnc.supervision.monitors.estimate_jump import EstimateJump
 from formation_gnc.supervision.monitors.frozen_readings import FrozenReadings
+from formation_gnc.supervision.monitors.heartbeat import CycleSlips, Heartbeat
 from formation_gnc.supervision.monitors.innovation_consistency import InnovationConsistency
 from formation_gnc.supervision.monitors.innovation_shift import InnovationBias, InnovationDrift
 from formation_gnc.supervision.monitors.mass import Mass
+from formation_gnc.supervision.monitors.neighbours import Neighbours
+from formation_gnc.supervision.monitors.propellant import Propellant
 from formation_gnc.supervision.monitors.residual_acceleration import ResidualAcceleration
 from formation_gnc.supervision.monitors.saturation import Saturation
+from formation_gnc.supervision.monitors.separation import Separation
 from formation_gnc.supervision.monitors.solver_fallback import SolverFallback
 from formation_gnc.supervision.monitors.thrust_response import ThrustResponse
 from formation_gnc.supervision.monitors.thruster_on import ThrusterOn
@@ -32,6 +36,11 @@ MONITORS: dict[str, type[Monitor]] = {
     "control_error": ControlError,
     "saturation": Saturation,
     "solver_fallback": SolverFallback,
+    "propellant": Propellant,
+    "separation": Separation,
+    "neighbours": Neighbours,
+    "heartbeat": Heartbeat,
+    "cycle_slips": CycleSlips,
 }
 
 

@@ -48,6 +48,7 @@ class ThrustTally:
         self.per_impulse = 1.0 / exhaust if exhaust > 0.0 else 0.0
         self.largest_rate = sum(parameters.thrust_limit) * self.per_impulse
         self.memory = np.zeros(kernels.TALLY)
+        self.memory[kernels.TURN] = parameters.mean_motion
         settings = np.zeros(kernels.TALLY_SETTINGS)
         settings[kernels.LIMIT : kernels.LIMIT + 3] = limits
         settings[kernels.ALLOWED : kernels.ALLOWED + 3] = [ALLOWED + coarse / each for each in limits]

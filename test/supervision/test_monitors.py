@@ -267,10 +267,10 @@ def test_what_is_normal_for_a_while_is_told_after_its_bound(monitor: str, change
     for tick in range(0, int(bound) - 10, 10):
         feed(health, tick, **changes)
     assert level(health, monitor, subject) is not Level.FAILED
-    for tick in range(int(bound) - 10, int(bound) + 21):
+    for tick in range(int(bound) - 10, int(bound) + 61):
         feed(health, tick, **changes)
     assert level(health, monitor, subject) is Level.FAILED
-    for tick in range(int(bound) + 21, int(bound) + 41):
+    for tick in range(int(bound) + 61, int(bound) + 121):
         feed(health, tick)
     assert level(health, monitor, subject) is Level.OK
 

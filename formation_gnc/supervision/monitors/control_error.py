@@ -4,7 +4,7 @@ from math import dist, inf, isfinite, tau
 
 from formation_gnc.records import EstimateStatus
 from formation_gnc.supervision.modes import Mode
-from formation_gnc.supervision.monitor import Monitor, Observation
+from formation_gnc.supervision.monitor import Monitor, Observation, When
 from formation_gnc.types import NANOSECONDS
 
 UNCONTROLLED = "coast"
@@ -38,6 +38,7 @@ class ControlError(Monitor):
     name = "control_error"
     title = "control error, growing although thrust is free"
     test = "bound, twice the tube once it was reached; else four windows of growth"
+    when = When.RARE
 
     def prepare(self) -> None:
         """On the way to the target."""

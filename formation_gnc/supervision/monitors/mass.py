@@ -27,14 +27,14 @@ class Mass(Monitor):
         self._start, self._last = self.parameters.mass, 0
 
     def feed(self, observation: Observation) -> None:
-        """Judge at slow ticks."""
+        """Judge, but where it has just been anchored."""
         measurement, thrust = observation.measurement, observation.thrust
         if measurement is None:
             return
         if observation.missed:
             self._anchor(measurement.mass, (observation.time - self._last) / NANOSECONDS, thrust)
         self._last = observation.time
-        if observation.slow:
+        if not observation.missed:
             expected = self._start - thrust.burned
             allowed = GAUGE * self.parameters.mass + USED * max(0.0, self.parameters.mass - expected)
             self.judge("", abs(measurement.mass - expected) / allowed, 0.5, 1.0)

@@ -4,7 +4,7 @@ from math import tau
 
 from formation_gnc.supervision.held import HeldTime
 from formation_gnc.supervision.modes import Mode
-from formation_gnc.supervision.monitor import Monitor, Observation
+from formation_gnc.supervision.monitor import Monitor, Observation, When
 
 
 class Saturation(Monitor):
@@ -13,12 +13,13 @@ class Saturation(Monitor):
     Motion in orbit, and what holds against it, changes sign within half a revolution.
 
     Cannot see: a demand that is wrong but within the limits.
-    Delay: the bound.
+    Delay: the bound, and up to a minute.
     """
 
     name = "saturation"
     title = "demand beyond the limits for long"
     test = "bound, half a revolution in keep, two in other modes"
+    when = When.RARE
 
     def prepare(self) -> None:
         """No time in saturation."""

@@ -3,7 +3,7 @@
 from math import tau
 
 from formation_gnc.supervision.held import HeldTime
-from formation_gnc.supervision.monitor import Monitor, Observation
+from formation_gnc.supervision.monitor import Monitor, Observation, When
 
 REVOLUTIONS = 0.02
 """Revolutions on a fallback that are a failure."""
@@ -15,12 +15,13 @@ class SolverFallback(Monitor):
     So long does free motion leave a formation as it is: the drift of a state is a matter of the orbit.
 
     Cannot see: a solver that gives a bad answer in time.
-    Delay: the bound.
+    Delay: the bound, and up to a minute.
     """
 
     name = "solver_fallback"
     title = "law on its fallback for long"
     test = "bound, 1/50 of a revolution"
+    when = When.RARE
 
     def prepare(self) -> None:
         """No time on a fallback."""

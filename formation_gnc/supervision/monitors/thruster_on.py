@@ -5,7 +5,7 @@ from math import tau
 
 from formation_gnc.supervision.held import HeldTime
 from formation_gnc.supervision.modes import Mode
-from formation_gnc.supervision.monitor import AXES, Monitor, Observation
+from formation_gnc.supervision.monitor import AXES, Monitor, Observation, When
 from formation_gnc.supervision.parameters import SupervisorParameters
 
 TOLERANCE = 0.1
@@ -23,6 +23,7 @@ class ThrusterOn(Monitor):
     name = "thruster_on"
     title = "thrust to one side for long, each axis"
     test = "bound, half a revolution in keep, two in other modes"
+    when = When.RARE
 
     def prepare(self) -> None:
         """All off."""
