@@ -20,6 +20,7 @@ from formation_gnc.records import (
     Measurement,
     Reading,
     Rejection,
+    Separation,
     Status,
     Target,
     Thrust,
@@ -50,7 +51,7 @@ def chiefs(count: int) -> Iterator[Vector]:
         states = propagator.propagate(0.0, states, np.zeros((1, 3)), np.ones(1))
 
 
-CHIEFS = list(chiefs(200))
+CHIEFS = list(chiefs(600))
 
 
 def records(tick: int, **changes: Any) -> Records:
@@ -111,7 +112,7 @@ def failed(health: Health) -> set[str]:
 
 def test_a_clean_run_fails_nothing() -> None:
     health = Health(parameters())
-    for tick in range(len(CHIEFS)):
+    for tick in range(200):
         feed(health, tick)
     assert failed(health) == set()
 
@@ -368,3 +369,89 @@ def test_every_monitor_states_what_it_assumes_or_cannot_see_and_its_delay() -> N
         inherited = monitor.__mro__[1].__doc__ or ""
         for heading in ("Cannot see:", "Delay:"):
             assert heading in documentation + inherited, f"{name} lacks {heading!r}"
+
+
+def test_thrust_that_is_told_as_off_is_found_by_its_acceleration() -> None:
+    """0.1 mm/s^2 along the normal, told as none: the propagated rate is off by 30 mm/s after five minutes."""
+    health, push, n = Health(parameters()), 1e-4, parameters().mean_motion
+    settled = 200
+    for tick in range(600):
+        t = max(0.0, (tick - settled) * TICK)
+        z, vz = push / n**2 * (1.0 - np.cos(n * t)), push / n * np.sin(n * t)
+        state = np.array([0.0, -100.0, z, 0.0, 0.0, vz])
+        feed(health, tick, estimate={"relative_state": state})
+        if tick < settled:
+            assert level(health, "residual_acceleration", "z") is Level.OK
+    assert level(health, "residual_acceleration", "z") is Level.FAILED
+    assert level(health, "residual_acceleration", "x") is Level.OK
+
+
+def test_propellant_that_does_not_last_is_told_after_a_revolution() -> None:
+    """10 mN all the time take 59 g a revolution at 100 s: for 60 revolutions a kilogram is not enough."""
+    for dry_mass, expected in ((0.0, Level.OK), (99.0, Level.FAILED)):
+        settings = parameters(specific_impulse=100.0, dry_mass=dry_mass, tick=60.0, duration=60.0 * 5828.0)
+        health = Health(settings)
+        for tick in range(110):
+            measured = {"applied_force": np.array([0.0, 0.01, 0.0]), "mass": 100.0 - 6e-4 * tick}
+            health.feed(tick * settings.tick_ns, Mode.KEEP, *records(tick, measurement=measured))
+        assert level(health, "propellant") is expected
+
+
+def test_a_separation_is_low_by_its_distance_and_its_uncertainty() -> None:
+    """At a limit of 20 m: 19 m ahead is too close; 30 m in two hours is, since it may drift by 40 m until then."""
+    for planned, passive, expected in ((19.0, 500.0, "planned"), (100.0, 30.0, "passive"), (100.0, 500.0, "")):
+        health = Health(parameters(least_separation=20.0))
+        given = Separation(0, planned, 0, "deputy2", passive, 7200 * NANOSECONDS, "deputy2")
+        health.feed(0, Mode.KEEP, *records(0), given)
+        for subject in ("planned", "passive"):
+            assert (level(health, "separation", subject) is Level.FAILED) == (subject == expected)
+
+
+def test_a_neighbour_that_falls_silent_is_told_after_a_minute() -> None:
+    health = Health(parameters())
+    for tick in range(200):
+        count = 3 if tick < 100 else 2
+        feed(health, tick, target={"neighbours": np.zeros((count, 6))})
+        assert (level(health, "neighbours") is Level.FAILED) == (tick >= 160)
+
+
+@pytest.mark.parametrize(
+    ("silent", "name"), [((1, 2, 3, 4), "navigation"), ((2, 3, 4), "guidance"), ((3, 4), "controller")]
+)
+def test_the_first_module_that_does_not_answer_is_named(silent: tuple[int, ...], name: str) -> None:
+    health = Health(parameters())
+    for tick in range(200):
+        given = [None if tick >= 100 and place in silent else each for place, each in enumerate(records(tick))]
+        health.feed(round(tick * TICK * NANOSECONDS), Mode.KEEP, *given)  # type: ignore[arg-type]
+    for module in ("navigation", "guidance", "controller"):
+        assert level(health, "heartbeat", module) is (Level.FAILED if module == name else Level.OK)
+
+
+def test_missed_ticks_are_counted_over_a_hundred() -> None:
+    health = Health(parameters())
+    for tick in range(0, 100):
+        feed(health, tick)
+    for tick in range(100, 118, 2):
+        feed(health, tick)
+    assert level(health, "cycle_slips") is not Level.FAILED
+    feed(health, 125)
+    assert level(health, "cycle_slips") is Level.FAILED
+    for tick in range(126, 241):
+        feed(health, tick)
+    assert level(health, "cycle_slips") is Level.OK
+
+
+def test_a_law_that_is_told_to_coast_has_no_control_error() -> None:
+    for law, expected in (("lqr", Level.FAILED), ("coast", Level.OK)):
+        health = Health(parameters(tube=10.0))
+        for tick in range(400):
+            state = np.array([0.0, -100.0 - 0.1 * tick, 0.0, 0.0, 0.0, 0.0])
+            feed(health, tick, estimate={"relative_state": state}, status={"algorithm": law})
+        assert level(health, "control_error") is expected
+
+
+def test_innovations_smaller_than_predicted_are_no_fault() -> None:
+    health, small = Health(parameters()), [Innovation("radius", [0.001], [1.0], 1e-6)]
+    for tick in range(2000):
+        feed(health, tick, estimate={"innovations": small if tick % 10 == 0 else [], "nis": 1e-6})
+    assert level(health, "innovation_consistency") is Level.OK
