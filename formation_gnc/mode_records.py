@@ -37,6 +37,7 @@ class RestrictionKind(StrEnum):
 
 
 NO_FORCE: Vector = np.zeros(3)
+NO_FORCE.setflags(write=False)
 
 
 @dataclass(slots=True)

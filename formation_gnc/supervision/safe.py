@@ -8,9 +8,9 @@ from typing import Protocol
 import numpy as np
 
 from formation_gnc.errors import ConfigurationError, ImpactError
+from formation_gnc.mode_records import NO_FORCE, Mode
 from formation_gnc.records import Estimate
 from formation_gnc.supervision.coasting import Burn, Forecast, Outcome
-from formation_gnc.supervision.modes import Mode
 from formation_gnc.supervision.monitor import AXES
 from formation_gnc.supervision.parameters import SupervisorParameters
 from formation_gnc.supervision.passive_safety import elements, manoeuvre, safe_orbits
@@ -36,9 +36,6 @@ CERTAIN = 3.0
 
 DISTRUST = 3.0
 """Factor on the deviations of a state that is not trusted."""
-
-NO_FORCE = np.zeros(3)
-NO_FORCE.setflags(write=False)
 
 _CHIEF = np.zeros((1, 6))
 

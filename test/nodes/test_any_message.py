@@ -24,7 +24,8 @@ from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import Scenario, load_scenario
 from formation_gnc.transport.conversion import codec, from_cdr, message_type, received, to_cdr, type_name
 
-NAMES = st.sampled_from(
+WORDS = ["", "deputy1", "radius", "range_rate", "latitude", "lqr", "gate", "keep", "safe", "sensor"]
+NAMES = st.sampled_from([*WORDS, "ä\U0001f6f0", "x" * 300])
     [
         "",
         "deputy1",

@@ -60,12 +60,18 @@ Watch = Callable[..., Flight]
 
 @pytest.fixture(scope="session")
 def watch() -> Watch:
-    """Fly a scenario for some ticks, by default to the end, with a fault from a tick on."""
+    """Fly a scenario for some ticks, by default to the end, with a fault of the plant or another one from a tick on."""
 
     def watch(
-        name: str, seed: int = 1, ticks: int | None = None, onset: int = 0, corrupt: Corrupt | None = None
+        name: str,
+        seed: int = 1,
+        ticks: int | None = None,
+        onset: int = 0,
+        corrupt: Corrupt | None = None,
+        fault: str = "",
     ) -> Flight:
-        scenario = load_scenario(name, {"/plant": {"seed": seed}})
+        faults = [f"{{at: {onset}.0, deputy: {DEPUTY}, {fault}}}"] if fault else []
+        scenario = load_scenario(name, {"/plant": {"seed": seed, "faults": faults}})
         run, health, flight = Run(scenario), Health(supervisor_parameters(scenario)), Flight()
         if corrupt is not None:
             with_fault(run, onset, corrupt)
