@@ -83,28 +83,14 @@ class Health:
             kinds |= _READINGS
         if is_suspect or self._was_suspect:
             kinds |= _THRUST
-        if separation is not None:
-            kinds |= _SEPARATION
-        if missed:
-            kinds |= _GAP
+        kinds |= (_SEPARATION if separation is not None else 0) | (_GAP if missed else 0)
         self._was_suspect = is_suspect
         if kinds:
             if estimate is not None and not isfinite(sum(estimate.relative_state.tolist())):
                 estimate = None
             reckoning = self._reckon(measurement, estimate) if left == 0 else None
-            observation = Observation(
-                time,
-                missed,
-                left == 0,
-                mode,
-                measurement,
-                estimate,
-                target,
-                status,
-                separation,
-                self._thrust,
-                reckoning,
-            )
+            given = measurement, estimate, target, status, separation
+            observation = Observation(time, missed, left == 0, mode, *given, self._thrust, reckoning)
             for monitor in self._fed(kinds):
                 monitor.feed(observation)
         return True
