@@ -26,21 +26,6 @@ from formation_gnc.transport.conversion import codec, from_cdr, message_type, re
 
 WORDS = ["", "deputy1", "radius", "range_rate", "latitude", "lqr", "gate", "keep", "safe", "sensor"]
 NAMES = st.sampled_from([*WORDS, "ä\U0001f6f0", "x" * 300])
-    [
-        "",
-        "deputy1",
-        "radius",
-        "range_rate",
-        "latitude",
-        "lqr",
-        "gate",
-        "keep",
-        "safe",
-        "sensor",
-        "ä\U0001f6f0",
-        "x" * 300,
-    ]
-)
 DOUBLES = st.floats(width=64) | st.sampled_from([0.0, 1.0, 1e-300, 1e308, float("nan"), float("inf")])
 STAMPS = st.integers(-(2**31) * 10**9, (2**31 - 1) * 10**9) | st.sampled_from([0, 10**9, 2 * 10**9])
 
