@@ -104,6 +104,12 @@ def nodes_of(bag: Bag, modules: Sequence[str]) -> list[str]:
     return [f"/{deputy}/{row.name}" for row in rows for deputy in deputies]
 
 
+def has_flown(bag: Bag, node: str) -> bool:
+    """Whether a bag has any output of a node."""
+    outputs = (topic.of(topics.deputy_of(node)) for topic in MODULES[_name(node)].gives)
+    return any(topic in bag.topics and bag.topics[topic].count for topic in outputs)
+
+
 def replay(bag: Bag, parameters: Mapping[str, Mapping[str, Any]], decode: Decode, sink: Sink, copy: Copy) -> list[str]:
     """Run a bag's inputs through modules again, tick by tick.
 

@@ -17,7 +17,16 @@ from formation_gnc.mode_records import (
     RestrictionKind,
 )
 from formation_gnc.parameters import change
-from formation_gnc.records import Estimate, EstimateStatus, EventKind, Measurement, Status, Target, Thrust
+from formation_gnc.records import (
+    NO_NEIGHBOURS,
+    Estimate,
+    EstimateStatus,
+    EventKind,
+    Measurement,
+    Status,
+    Target,
+    Thrust,
+)
 from formation_gnc.sensors.registry import sensors
 from formation_gnc.supervision.fault_table import DEFAULT, Entry, Response, parse, table_of
 from formation_gnc.supervision.health import Health
@@ -44,6 +53,12 @@ RESTRICTIONS = {
 }
 """What modules do without, by response."""
 
+UNTRUSTED = frozenset({"innovation_consistency", "estimate_jump", "chief_ephemeris"})
+"""Monitors whose failure says that the estimate is not to be steered by."""
+
+BLIND = frozenset({Mode.ACQUIRE, Mode.KEEP, Mode.RECONFIGURE, Mode.AVOID})
+"""Modes that steer by the estimate, and end where its last sensor is at fault."""
+
 type Design = tuple[Entry, ...]
 
 _decide = cache(step)
@@ -66,6 +81,8 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         self._responses = FaultResponses(self.configuration.design)
         self._active: list[ActiveResponse] = []
         self._restrictions: list[Restriction] = []
+        self._blinded = ""
+        """Why no sensor is left to trust; empty while one is."""
         self._failed: dict[tuple[str, str], int] = {}
         """Time (ns) of the latest failure by monitor and subject."""
         self._statuses: list[tuple[str, str, Level]] | None = None
@@ -116,7 +133,7 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         if new.design != old.design or "enabled" in new.changes:
             self._responses = FaultResponses(new.design)
             self._report(self.time, [])
-            self._active, self._restrictions = [], []
+            self._active, self._restrictions, self._blinded = [], [], ""
         if new.changes.keys() - {"mode", "fault_table", "schedule"}:
             self._health = Health(new.parameters)
 
@@ -144,7 +161,7 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         if self.parameters.enabled and (before is not None or estimate is not None):
             self._judge(time, before, estimate, target, status, thrust)
         self._before = measurement
-        return self._decide(time, triggers, estimate), self._health_report(time)
+        return self._decide(time, triggers, estimate, target), self._health_report(time)
 
     def _judge(
         self,
@@ -174,11 +191,15 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
             self._active = active
             self._restrictions = list(self._restricted())
 
-    def _decide(self, time: int, triggers: list[Trigger], estimate: Estimate | None) -> ModeState:
+    def _decide(
+        self, time: int, triggers: list[Trigger], estimate: Estimate | None, target: Target | None
+    ) -> ModeState:
         faults = dict[Trigger, str]()
         for each in self._active:
             if each.response is Response.GO_TO and each.entry.mode is not None:
                 faults.setdefault(FAULTS[each.entry.mode], each.cause)
+        if self._blinded and self._mode in BLIND:
+            faults.setdefault(FAULTS[Mode.SAFE], self._blinded)
         if self._command is not None:
             triggers.append(self._command)
         self._command = None
@@ -186,7 +207,7 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         for trigger, reason in decided.refusals:
             self.log(time, EventKind.REJECTED, f"{trigger}: {reason}", "mode")
         if decided.mode is not before:
-            self._enter(time, decided, faults, estimate)
+            self._enter(time, decided, faults, estimate, target)
         self._in_force = before
         if self.parameters.mode != self._mode:
             parameters = change(self.parameters, {"mode": str(self._mode)})
@@ -194,7 +215,14 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         force = NO_FORCE if self._evasion is None else self._evasion.force(time + self.parameters.tick_ns)
         return ModeState(time, str(self._mode), str(before), self._since, self._reason, force, self._restrictions)
 
-    def _enter(self, time: int, decided: Step, faults: dict[Trigger, str], estimate: Estimate | None) -> None:
+    def _enter(
+        self,
+        time: int,
+        decided: Step,
+        faults: dict[Trigger, str],
+        estimate: Estimate | None,
+        target: Target | None,
+    ) -> None:
         """Go to another mode, from the tick after a time (ns) on."""
         before, self._mode = self._mode, decided.mode
         self._since = time + self.parameters.tick_ns
@@ -203,9 +231,23 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         detail = f"from {before}: {self._reason}"
         self._evasion = None
         if self._mode in EVASIVE:
-            self._evasion = plan_evasion(self._mode, self._since, estimate, self.parameters)
+            self._evasion = self._plan(estimate, target)
             detail += f"; {self._evasion.words}"
         self.log(time, EventKind.MODE, detail, str(self._mode))
+
+    def _plan(self, estimate: Estimate | None, target: Target | None) -> Evasion:
+        """The way out: away from the neighbours that guidance knows, with the axes that work."""
+        broken = {each.subject for each in self._restrictions if each.kind == RestrictionKind.AXIS}
+        failing = {each.monitor for each in self._health.notable() if each.level is Level.FAILED}
+        return plan_evasion(
+            self._mode,
+            self._since,
+            estimate,
+            self.parameters,
+            NO_NEIGHBOURS if target is None else target.neighbours,
+            broken,
+            not self._blinded and UNTRUSTED.isdisjoint(failing),
+        )
 
     def _events(self, estimate: Estimate | None, target: Target | None) -> list[Trigger]:
         """Triggers by estimate and target of the tick before."""
@@ -236,6 +278,7 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
 
     def _restricted(self) -> Iterator[Restriction]:
         """What modules do without, each once."""
+        self._blinded = ""
         known = set[tuple[RestrictionKind, str]]()
         sensors_left = len(self.parameters.sensors)
         for each in self._active:
@@ -245,6 +288,7 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
                     continue
                 if kind is RestrictionKind.SENSOR:
                     if sensors_left == 1:  # without any the state would be lost
+                        self._blinded = f"{each.cause}: the last sensor"
                         continue
                     sensors_left -= 1
                 known.add((kind, subject))

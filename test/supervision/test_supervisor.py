@@ -99,18 +99,24 @@ def test_a_fault_leads_to_safe_and_a_command_out_of_it_once_it_is_over() -> None
     assert tick(module, 40)[0].mode == "acquire"
 
 
-def test_a_sensor_with_a_fault_is_isolated_and_the_last_one_never() -> None:
+def test_a_sensor_at_fault_is_isolated_and_the_last_one_leads_to_safe() -> None:
     module = supervisor()
     for number in range(0, 100):
         readings = [replace(each, values=[7.0]) for each in records(number)[0].readings]  # type: ignore[union-attr]
         state, _ = tick(module, number, measurement={"readings": readings[:1]})
     assert without(state, RestrictionKind.SENSOR) == ["radius"]
     assert state.restrictions[0].reason == "frozen_readings radius"
+    assert state.mode == "keep"
     module = supervisor()
     for number in range(0, 100):
         readings = [replace(each, values=[7.0]) for each in records(number)[0].readings]  # type: ignore[union-attr]
         state, _ = tick(module, number, measurement={"readings": readings})
     assert len(without(state, RestrictionKind.SENSOR)) == 2
+    assert state.mode == "safe"
+    assert state.reason.endswith(": the last sensor")
+    assert "the state is not trusted" in changes_of_mode(module)[-1] or "coasts" in changes_of_mode(module)[-1]
+    command(module, "acquire")
+    assert tick(module, 100, measurement={"readings": readings})[0].mode == "safe"
 
 
 def test_without_an_estimate_there_is_a_mode_nevertheless() -> None:
