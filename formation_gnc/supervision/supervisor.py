@@ -56,9 +56,6 @@ RESTRICTIONS = {
 UNTRUSTED = frozenset({"innovation_consistency", "estimate_jump", "chief_ephemeris"})
 """Monitors whose failure says that the estimate is not to be steered by."""
 
-BLIND = frozenset({Mode.ACQUIRE, Mode.KEEP, Mode.RECONFIGURE, Mode.AVOID})
-"""Modes that steer by the estimate, and end where its last sensor is at fault."""
-
 type Design = tuple[Entry, ...]
 
 _decide = cache(step)
@@ -198,7 +195,7 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         for each in self._active:
             if each.response is Response.GO_TO and each.entry.mode is not None:
                 faults.setdefault(FAULTS[each.entry.mode], each.cause)
-        if self._blinded and self._mode in BLIND:
+        if self._blinded and self._mode is not Mode.STANDBY:  # which steers by nothing
             faults.setdefault(FAULTS[Mode.SAFE], self._blinded)
         if self._command is not None:
             triggers.append(self._command)
@@ -231,11 +228,11 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         detail = f"from {before}: {self._reason}"
         self._evasion = None
         if self._mode in EVASIVE:
-            self._evasion = self._plan(estimate, target)
+            self._evasion = self._way_out(estimate, target)
             detail += f"; {self._evasion.words}"
         self.log(time, EventKind.MODE, detail, str(self._mode))
 
-    def _plan(self, estimate: Estimate | None, target: Target | None) -> Evasion:
+    def _way_out(self, estimate: Estimate | None, target: Target | None) -> Evasion:
         """The way out: away from the neighbours that guidance knows, with the axes that work."""
         broken = {each.subject for each in self._restrictions if each.kind == RestrictionKind.AXIS}
         failing = {each.monitor for each in self._health.notable() if each.level is Level.FAILED}
