@@ -121,6 +121,12 @@ class StampSynchronizer:
             ]
         return inputs
 
+    @property
+    def unanswered(self) -> Any | None:
+        """The pacing record of the current stamp while others are awaited; None for none."""
+        current = self._current
+        return None if current is None or current == self._completed else self._received[self._pacing].get(current)
+
     def _of(self, topic: str, time: int) -> Stamped | None:
         """The record of a topic for a pacing stamp (ns)."""
         return self._received[topic].get(time - self._topics.delay if topic in self._topics.delayed else time)

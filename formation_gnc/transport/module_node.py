@@ -112,6 +112,9 @@ class ModuleNode(ConfiguredNode):
         pacing = records.get(pace, [])
         addressed = [record for published, record in pacing[:-1] if published >= self._started]
         addressed += [record for _, record in pacing[-1:]]
+        begun = self._instance.synchronizer.unanswered
+        if begun is not None and addressed and begun.time < addressed[0].time:
+            addressed.insert(0, begun)  # what it awaits may be among those that wait
         first = self._module.first_of(addressed).time if addressed else 0
         kept = []
         for topic, messages in records.items():

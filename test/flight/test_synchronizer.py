@@ -66,6 +66,7 @@ def test_order_of_arrival_does_not_matter_after_a_silence(fleet: StampSynchroniz
 
 def test_needed_topic_is_always_waited_for() -> None:
     pair = StampSynchronizer(InputTopics(("estimate", "target")))
+    assert pair.unanswered is None
     assert groups(pair, ("estimate", 10), ("estimate", 20), ("estimate", 30)) == []
     assert groups(pair, ("target", 30)) == [[30, 30]]
 
