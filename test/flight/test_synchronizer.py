@@ -142,3 +142,14 @@ def test_whole_ticks_are_taken_as_record_by_record(ticks: list[set[str]]) -> Non
         taken = [single.take(topic, records[topic]) for topic in sorted(records, key=(OWN, SECOND, THIRD, MODE).index)]
         assert next((each for each in taken if each), None) == whole.take_tick(records, before)
         before = records
+
+
+def test_a_tick_is_unanswered_until_the_last_of_its_records_is_there() -> None:
+    """Whoever catches up may not leave out what that tick awaits."""
+    pair = delayed()
+    pair.take(OWN, At(10))
+    begun = pair.unanswered
+    assert begun is not None
+    assert begun.time == 10
+    pair.take(MODE, At(0))
+    assert pair.unanswered is None
