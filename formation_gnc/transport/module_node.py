@@ -95,7 +95,8 @@ class ModuleNode(ConfiguredNode):
 
     def _receive(self, topic: str, record: Any, about: Information) -> None:
         published = about["source_timestamp"]
-        if not self._waiting and time_ns() - published < LATE:
+        is_behind = topic == self._instance.needed[0] and self._instance.synchronizer.unanswered is not None
+        if not self._waiting and not is_behind and time_ns() - published < LATE:
             self._take(topic, record)
             return
         if not self._waiting:
