@@ -45,6 +45,7 @@ class Rejection(StrEnum):
 
     NOT_FINITE = "not_finite"
     GATE = "gate"
+    ISOLATED = "isolated"
     FUTURE = "future"
     LATE = "late"
     DUPLICATE = "duplicate"
@@ -185,6 +186,27 @@ NO_NEIGHBOURS: Matrix = np.empty((0, 6))
 
 
 @dataclass(slots=True)
+class Separation(Record):
+    """Predicted least distances of a deputy to the other satellites of its fleet."""
+
+    message: ClassVar = "Separation"
+    frame_id: ClassVar = "hill"
+
+    time: int
+    planned: float
+    planned_time: int
+    planned_neighbour: str = field(metadata=bounded(at_most(NAME_LENGTH)))
+    passive: float
+    passive_time: int
+    passive_neighbour: str = field(metadata=bounded(at_most(NAME_LENGTH)))
+
+    @property
+    def nearest(self) -> str:
+        """Name of the neighbour at the lesser of both distances."""
+        return self.planned_neighbour if self.planned <= self.passive else self.passive_neighbour
+
+
+@dataclass(slots=True)
 class Target(Record):
     """Relative state that a deputy is to have, now and over the horizon."""
 
@@ -200,6 +222,8 @@ class Target(Record):
     neighbours: Matrix = field(default_factory=lambda: NO_NEIGHBOURS, metadata=bounded(at_most(ROWS, finite_state)))
     """(N, 6), a row for each RelativeState."""
     reconfiguring: bool = False
+    separation: list[Separation] = field(default_factory=list, metadata=bounded(each(1)))
+    """Predicted at this tick; empty where none is due."""
 
 
 @dataclass(slots=True)
@@ -229,27 +253,6 @@ class Status(Record):
     cost: float = 0.0
     fallback: str = field(default="", metadata=bounded(at_most(NAME_LENGTH)))
     mode: str = field(default="", metadata=bounded(at_most(NAME_LENGTH)))  # Mode
-
-
-@dataclass(slots=True)
-class Separation(Record):
-    """Predicted least distances of a deputy to the other satellites of its fleet."""
-
-    message: ClassVar = "Separation"
-    frame_id: ClassVar = "hill"
-
-    time: int
-    planned: float
-    planned_time: int
-    planned_neighbour: str = field(metadata=bounded(at_most(NAME_LENGTH)))
-    passive: float
-    passive_time: int
-    passive_neighbour: str = field(metadata=bounded(at_most(NAME_LENGTH)))
-
-    @property
-    def nearest(self) -> str:
-        """Name of the neighbour at the lesser of both distances."""
-        return self.planned_neighbour if self.planned <= self.passive else self.passive_neighbour
 
 
 @dataclass(slots=True)

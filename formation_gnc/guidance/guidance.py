@@ -121,7 +121,10 @@ class Guidance(FlightModule[GuidanceParameters, TargetPath]):
             else NO_NEIGHBOURS,
             self._lock.is_closed(estimate.time),
         )
-        return target, self._predict_separation(estimate, target) if neighbours else None
+        separation = self._predict_separation(estimate, target) if neighbours else None
+        if separation is not None:
+            target.separation = [separation]
+        return target, separation
 
     def check_staged(self, staged: GuidanceConfiguration) -> None:
         """Reject a new target while a reconfiguration is under way or the mode evades, for one deputy alone where

@@ -101,16 +101,21 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
 
     @property
     def _design(self) -> Design:
-        """The design, without the sensors that are isolated; with all of them where none would be left."""
+        """The design, without the sensors that are isolated."""
         design = self.configuration.design
         if not self._isolated:
             return design
-        left = {name: each for name, each in design.variance.items() if name not in self._isolated}
-        return replace(design, variance=left or design.variance)
+        return replace(design, variance=self._left(self._isolated))
+
+    def _left(self, isolated: Sequence[str]) -> dict[str, tuple[float, ...]]:
+        """Variances of the sensors in use besides the isolated ones."""
+        return {name: each for name, each in self.configuration.design.variance.items() if name not in isolated}
 
     def _obey(self) -> None:
-        """Leave out the sensors that the mode says, or take them up again."""
+        """Leave out the sensors that the mode says, or take them up again; none where no other would be left."""
         isolated = self._mode.without(RestrictionKind.SENSOR)
+        if not self._left(isolated):
+            isolated = ()
         if isolated == self._isolated:
             return
         self._isolated = isolated
@@ -272,7 +277,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         """Update with the readings, and check consistency; none when the state is lost."""
         result = self._update(state, measurement)
         if result is not None:
-            rejected = [each.sensor for each in result.innovations if each.rejection]
+            rejected = [each.sensor for each in result.innovations if each.rejection == Rejection.GATE]
             verdict, factor = state.consistency.judge(
                 result.nis,
                 result.used,
@@ -316,7 +321,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         """Update with the readings that are valid and within the gate; none without a valid reading."""
         if not measurement.readings:
             return None
-        parameters, design = self.parameters, self._design
+        parameters, design = self.parameters, self.configuration.design
         readings = state.checks.accept(
             measurement.readings,
             measurement.time,
@@ -327,7 +332,8 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         )
         if readings is None:
             return None
-        return update(state, readings, design.gate, parameters.pseudo_measurements, self._rejections)
+        pseudo = parameters.pseudo_measurements
+        return update(state, readings, design.gate, pseudo, self._rejections, self._isolated)
 
     def _lose(self, time: int, reason: str) -> None:
         """Lose the state: without an estimate the tick is missed, and the next measurement has a fix."""

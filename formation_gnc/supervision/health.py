@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from functools import cache
 from math import isfinite
 
-from formation_gnc.records import Estimate, EstimateStatus, Measurement, Separation, Status, Target, Thrust
+from formation_gnc.records import Estimate, EstimateStatus, Measurement, Status, Target, Thrust
 from formation_gnc.supervision.modes import Mode
 from formation_gnc.supervision.monitor import Monitor, Observation, Verdict, When
 from formation_gnc.supervision.parameters import SupervisorParameters
@@ -53,7 +53,6 @@ class Health:
         target: Target | None,
         status: Status | None,
         thrust: Thrust | None,
-        separation: Separation | None = None,
     ) -> bool:
         """Feed all monitors; returns whether there was anything new: a time that is not later than the last is ignored.
 
@@ -65,7 +64,6 @@ class Health:
             target: of guidance.
             status: of the controller.
             thrust: commanded for the tick that begins.
-            separation: of guidance, at the ticks at which it predicts.
         """
         last = self._last
         if last is not None and time <= last:
@@ -83,6 +81,7 @@ class Health:
             kinds |= _READINGS
         if is_suspect or self._was_suspect:
             kinds |= _THRUST
+        separation = target.separation[0] if target is not None and target.separation else None
         kinds |= (_SEPARATION if separation is not None else 0) | (_GAP if missed else 0)
         self._was_suspect = is_suspect
         if kinds:

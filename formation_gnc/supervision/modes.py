@@ -26,9 +26,8 @@ class Trigger(StrEnum):
     """Control error beyond the tube."""
     RECONFIGURATION_BEGAN = "reconfiguration began"
     RECONFIGURATION_ENDED = "reconfiguration ended"
-    SEPARATION_LOW = "separation low"
-    """Predicted separation below its limit."""
     SEPARATION_RESTORED = "separation restored"
+    """Predicted separation above its limit again, after the evasion."""
     FAULT_STANDBY = "fault standby"
     FAULT_ACQUIRE = "fault acquire"
     FAULT_AVOID = "fault avoid"
@@ -50,7 +49,6 @@ PRIORITY = (
     Trigger.FAULT_SAFE,
     Trigger.TO_SAFE,
     Trigger.FAULT_STANDBY,
-    Trigger.SEPARATION_LOW,
     Trigger.FAULT_AVOID,
     Trigger.STATE_LOST,
     Trigger.TO_STANDBY,
@@ -91,13 +89,13 @@ TRANSITIONS = _rows(
     (Mode.ACQUIRE, "command standby, fault standby", Mode.STANDBY),
     (Mode.ACQUIRE, "target reached", Mode.KEEP),
     (Mode.ACQUIRE, "reconfiguration began", Mode.RECONFIGURE),
-    (Mode.ACQUIRE, "separation low, command avoid, fault avoid", Mode.AVOID),
+    (Mode.ACQUIRE, "command avoid, fault avoid", Mode.AVOID),
     (Mode.ACQUIRE, "command safe, fault safe", Mode.SAFE),
     (Mode.KEEP, "command keep", Mode.KEEP),
     (Mode.KEEP, "command standby, fault standby", Mode.STANDBY),
     (Mode.KEEP, "target left, state lost, acquired, command acquire, fault acquire", Mode.ACQUIRE),
     (Mode.KEEP, "reconfiguration began", Mode.RECONFIGURE),
-    (Mode.KEEP, "separation low, command avoid, fault avoid", Mode.AVOID),
+    (Mode.KEEP, "command avoid, fault avoid", Mode.AVOID),
     (Mode.KEEP, "command safe, fault safe", Mode.SAFE),
     (Mode.RECONFIGURE, "command reconfigure", Mode.RECONFIGURE),
     (Mode.RECONFIGURE, "command standby, fault standby", Mode.STANDBY),
@@ -106,9 +104,9 @@ TRANSITIONS = _rows(
         "reconfiguration ended, state lost, acquired, command acquire, fault acquire",
         Mode.ACQUIRE,
     ),
-    (Mode.RECONFIGURE, "separation low, command avoid, fault avoid", Mode.AVOID),
+    (Mode.RECONFIGURE, "command avoid, fault avoid", Mode.AVOID),
     (Mode.RECONFIGURE, "command safe, fault safe", Mode.SAFE),
-    (Mode.AVOID, "command avoid, fault avoid, separation low", Mode.AVOID),
+    (Mode.AVOID, "command avoid, fault avoid", Mode.AVOID),
     (Mode.AVOID, "fault standby", Mode.STANDBY),
     (Mode.AVOID, "separation restored", Mode.ACQUIRE),
     (Mode.AVOID, "state lost, command safe, fault safe", Mode.SAFE),

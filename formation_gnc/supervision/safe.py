@@ -185,6 +185,10 @@ class Evasion(Protocol):
     def words(self) -> str:
         """What is flown and why, for people."""
 
+    @property
+    def end(self) -> int:
+        """Time from which there is no thrust, ns."""
+
     def force(self, time: int) -> Vector:
         """Force (3,) to hold over the tick that begins at a time (ns), Hill frame, N."""
 
@@ -192,9 +196,9 @@ class Evasion(Protocol):
 class Coast:
     """No thrust."""
 
-    def __init__(self, words: str = "coasts") -> None:
-        """For a reason."""
-        self.words = words
+    def __init__(self, start: int, words: str) -> None:
+        """From a time on, ns, for a reason."""
+        self.end, self.words = start, words
 
     def force(self, time: int) -> Vector:
         """None."""
@@ -215,6 +219,7 @@ class Manoeuvre:
             )
             for each in way.burns
         ]
+        self.end = max((end for _, end, _ in self._burns), default=start)
 
     def force(self, time: int) -> Vector:
         """Of the burn that is due."""
@@ -242,11 +247,11 @@ def plan_evasion(
         is_trusted: whether the estimate is.
     """
     if estimate is None:
-        return Coast("coasts: there is no state to steer by")
+        return Coast(time, "coasts: there is no state to steer by")
     if not (
         np.isfinite(estimate.covariance).all() and np.isfinite(estimate.relative_state).all() and estimate.mass > 0.0
     ):
-        return Coast("coasts: the estimate is not finite")
+        return Coast(time, "coasts: the estimate is not finite")
     limits = [0.0 if axis in broken else each for axis, each in zip(AXES, parameters.thrust_limit, strict=True)]
     situation = Situation(
         estimate.chief_state,
@@ -262,5 +267,5 @@ def plan_evasion(
     try:
         way = way_out(situation, horizon, urgent)
     except (ImpactError, ConfigurationError, ValueError) as error:
-        return Coast(f"coasts: no way out is found, {error}")
-    return Manoeuvre(way, time, estimate.mass) if way.burns else Coast(way.words)
+        return Coast(time, f"coasts: no way out is found, {error}")
+    return Manoeuvre(way, time, estimate.mass) if way.burns else Coast(time, way.words)

@@ -56,6 +56,9 @@ RESTRICTIONS = {
 UNTRUSTED = frozenset({"innovation_consistency", "estimate_jump", "chief_ephemeris"})
 """Monitors whose failure says that the estimate is not to be steered by."""
 
+SEPARATION = "separation"
+"""Monitor by which `avoid` ends."""
+
 type Design = tuple[Entry, ...]
 
 _decide = cache(step)
@@ -158,6 +161,8 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         if self.parameters.enabled and (before is not None or estimate is not None):
             self._judge(time, before, estimate, target, status, thrust)
         self._before = measurement
+        if self._mode is Mode.AVOID and self._is_restored(target):
+            triggers.append(Trigger.SEPARATION_RESTORED)
         return self._decide(time, triggers, estimate, target), self._health_report(time)
 
     def _judge(
@@ -264,6 +269,15 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         elif not square <= (LEFT * tube) ** 2:  # true for NaN
             triggers.append(Trigger.TARGET_LEFT)
         return triggers
+
+    def _is_restored(self, target: Target | None) -> bool:
+        """Whether a prediction made after the last burn is above the limit."""
+        predicted = [] if target is None else target.separation
+        if not predicted or self.parameters.least_separation <= 0.0 or not self.parameters.enabled:
+            return False
+        is_low = any(each.monitor == SEPARATION and each.level is Level.FAILED for each in self._health.notable())
+        ended = self._since if self._evasion is None else self._evasion.end
+        return predicted[0].time >= ended and not is_low
 
     def _report(self, time: int, active: list[ActiveResponse]) -> None:
         """Log responses that begin or end; a detection is warning enough."""

@@ -84,7 +84,6 @@ def test_a_held_set_of_triggers_settles_instead_of_going_round() -> None:
     contradictions = (
         {Trigger.TARGET_LEFT, Trigger.TARGET_REACHED},
         {Trigger.RECONFIGURATION_BEGAN, Trigger.RECONFIGURATION_ENDED},
-        {Trigger.SEPARATION_LOW, Trigger.SEPARATION_RESTORED},
         {Trigger.STATE_LOST, Trigger.ACQUIRED},
     )
     once = {Trigger.ACQUIRED, Trigger.RECONFIGURATION_BEGAN, Trigger.RECONFIGURATION_ENDED}

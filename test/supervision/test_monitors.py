@@ -402,7 +402,7 @@ def test_a_separation_is_low_by_its_distance_and_its_uncertainty() -> None:
     for planned, passive, expected in ((19.0, 500.0, "planned"), (100.0, 30.0, "passive"), (100.0, 500.0, "")):
         health = Health(parameters(least_separation=20.0))
         given = Separation(0, planned, 0, "deputy2", passive, 7200 * NANOSECONDS, "deputy2")
-        health.feed(0, Mode.KEEP, *records(0), given)
+        health.feed(0, Mode.KEEP, *records(0, target={"separation": [given]}))
         for subject in ("planned", "passive"):
             assert (level(health, "separation", subject) is Level.FAILED) == (subject == expected)
 

@@ -8,7 +8,7 @@ import pytest
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.mode_records import NO_FORCE, HealthReport, ModeState, RestrictionKind
-from formation_gnc.records import Event, EventKind
+from formation_gnc.records import Event, EventKind, Innovation, Rejection, Separation
 from formation_gnc.supervision.supervisor import Supervisor
 from formation_gnc.types import NANOSECONDS
 
@@ -215,3 +215,31 @@ def test_a_command_ends_what_has_no_return_where_the_fault_is_over() -> None:
     assert [each.detail for each in module.take_events() if each.kind == EventKind.RESPONSE] == [
         "ends: mass: go_to safe"
     ]
+
+
+def test_a_separation_too_low_is_evaded_until_a_later_prediction_is_above_the_limit() -> None:
+    module = supervisor(least_separation=20.0)
+    modes = []
+    for number in range(400):
+        time, distance = (number - 1) * NANOSECONDS, 10.0 if number < 100 else 500.0
+        due = [Separation(time, distance, time, "deputy2", distance, time, "deputy2")] if number % 60 == 1 else []
+        modes.append(tick(module, number, target={"separation": due})[0].mode)
+    assert modes[1] == "avoid"
+    # low until the prediction of tick 120; a return of 60 ticks, and the first prediction after it
+    assert {*modes[1:180]} == {"avoid"}
+    assert modes[181:183] == ["acquire", "keep"]
+
+
+def test_what_is_isolated_is_judged_further_and_returns_when_it_is_well() -> None:
+    module = supervisor(fault_table=("{monitor: innovation_bias, response: isolate_sensor, return: 100}",))
+    isolated = []
+    for number in range(1000):
+        off = 30.0 if 100 <= number < 500 else 0.0
+        rejection = Rejection.ISOLATED if isolated and isolated[-1] else ""
+        innovations = [Innovation("radius", [off], [5.0], 0.0, rejection)] if number % 10 == 0 else []
+        state, _ = tick(module, number, estimate={"innovations": innovations})
+        isolated.append(without(state, RestrictionKind.SENSOR) == ["radius"])
+    begin, end = isolated.index(True), len(isolated) - isolated[::-1].index(True)
+    assert all(isolated[begin:end])
+    assert 100 < begin < 160
+    assert 600 < end < 900

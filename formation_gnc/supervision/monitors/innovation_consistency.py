@@ -2,7 +2,7 @@
 
 from collections import deque
 
-from formation_gnc.records import EstimateStatus
+from formation_gnc.records import EstimateStatus, Rejection
 from formation_gnc.supervision.cusum import LARGEST
 from formation_gnc.supervision.monitor import Monitor, Observation, When
 from formation_gnc.supervision.thresholds import chi_square_limit, suspicion
@@ -14,7 +14,7 @@ WINDOW = 60
 class InnovationConsistency(Monitor):
     """Sum over a window of the innovations squared, normalised (NIS), against chi-square.
 
-    What the gate refused counts with its square, up to 25. An inflation of the covariance by the filter is a failure by
+    What the gate refused counts with its square, up to 25; what is isolated does not count. An inflation of the covariance by the filter is a failure by
     the filter's own test.
 
     Smaller ones are no fault: process noise bounds what is not modelled, as the Earth's harmonics far from the chief.
@@ -42,12 +42,16 @@ class InnovationConsistency(Monitor):
             return
         nis, freedom = max(0.0, estimate.nis) if estimate.nis == estimate.nis else 0.0, 0
         for each in estimate.innovations:
+            if each.rejection == Rejection.ISOLATED:
+                continue
             freedom += len(each.values)
             if each.rejection:
                 nis += sum(
                     min((value / sigma) ** 2, LARGEST**2) if sigma > 0.0 and value == value else LARGEST**2
                     for value, sigma in zip(each.values, each.standard_deviations, strict=False)
                 )
+        if not freedom:
+            return
         if len(self._window) == WINDOW:
             old, gone = self._window[0]
             self._sum, self._freedom = self._sum - old, self._freedom - gone
