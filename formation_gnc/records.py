@@ -339,3 +339,4 @@ class Timing(Record):
     time: int
     node: str
     compute_time: int
+    missing: list[int] = field(default_factory=list, metadata=bounded(at_most(LIST_LENGTH)))

@@ -230,7 +230,7 @@ def _fly_one(campaign: Campaign, directory: Path, options: argparse.Namespace) -
     scenario = scenario_of(campaign, options.only, configuration)
     bag = options.bag or Path("bags") / f"{campaign.name}_{options.only}"
     given = {"bag": bag, "json": options.json, "in_process": not options.on_graph}
-    others = {"accept_lost": True, "composed": False, "display": False}
+    others = {"accept_lost": True, "composed": False, "display": False, "respawn": False}
     status = sil.fly(scenario, argparse.Namespace(**given, **others))
     if status == 0 and directory.is_dir():
         _compare(campaign, directory, options.only, configuration.name, bag)

@@ -77,6 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--display", action="store_true", help="draw the run as markers and transforms, for RViz or Foxglove"
     )
+    parser.add_argument("--respawn", action="store_true", help="start a deputy's node again when it has died")
     parser.add_argument(
         "--accept-lost", action="store_true", help="exit with status 0 also when the formation is lost or given up"
     )
@@ -96,7 +97,7 @@ def fly(scenario: Scenario, options: argparse.Namespace) -> int:
     console = Console(stderr=True, highlight=False)
     for warning in warnings(scenario):
         console.print(f"warning: {warning}", soft_wrap=True)
-    on_graph = partial(_fly_on_graph, composed=options.composed, display=options.display)
+    on_graph = partial(_fly_on_graph, composed=options.composed, display=options.display, respawn=options.respawn)
     try:
         speedup = (_fly_in_process if options.in_process else on_graph)(scenario, bag, console)
     except KeyboardInterrupt:
@@ -176,7 +177,9 @@ class _Display:
             self.say(message)
 
 
-def _fly_on_graph(scenario: Scenario, bag: Path, console: Console, composed: bool, display: bool) -> float:
+def _fly_on_graph(
+    scenario: Scenario, bag: Path, console: Console, composed: bool, display: bool, respawn: bool
+) -> float:
     from formation_gnc.sil.report import Report
     from formation_gnc.transport.launcher import LaunchOptions, fly_graph
 
@@ -186,7 +189,7 @@ def _fly_on_graph(scenario: Scenario, bag: Path, console: Console, composed: boo
         shown.show(report.message, report.figures.get("tick", 0.0), report.figures.get("speedup", 0.0))
 
     with _Display(console, scenario.plant.ticks) as shown:
-        options = LaunchOptions(bag.absolute(), composed, display)
+        options = LaunchOptions(bag.absolute(), composed, display, respawn)
         last = fly_graph(scenario, options, show, shown.say)
         return last.figures.get("speedup", 0.0)
 

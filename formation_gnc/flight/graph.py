@@ -193,9 +193,14 @@ class ModuleInstance:
         """The topics that it publishes: those of a fleet only in one."""
         return (topic for topic in self.row.gives if not topic.fleet_only or self.module.neighbours)
 
-    def collect(self, records: Mapping[str, Any], before: Mapping[str, Any]) -> Sequence[Any] | None:
-        """Its inputs at a tick, of the records that there are by topic, and of the tick before; None for no answer."""
-        return self.synchronizer.take_tick(records, before)
+    def collect(
+        self, records: Mapping[str, Any], before: Mapping[str, Any], missing: Sequence[int] | None = None
+    ) -> Sequence[Any] | None:
+        """Its inputs at a tick, of the records that there are by topic, and of the tick before; None for no answer.
+
+        missing: places of those that it is known to have answered without.
+        """
+        return self.synchronizer.take_tick(records, before, missing)
 
     def respond(self, inputs: Sequence[Any]) -> list[tuple[str, Any]]:
         """Answer a tick: full topic name and record of each output there is."""
@@ -207,6 +212,11 @@ class ModuleInstance:
     def take_events(self) -> list[Event]:
         """The module's events since they were last taken."""
         return self.module.take_events()
+
+
+def missing(inputs: Sequence[Any]) -> list[int]:
+    """Places of the inputs of a tick that a module does without."""
+    return [place for place, each in enumerate(inputs) if each is None] if None in inputs else []
 
 
 def every_tick(deputy: str) -> list[str]:

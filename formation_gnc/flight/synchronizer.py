@@ -92,8 +92,12 @@ class StampSynchronizer:
         self._completed = current
         return records
 
-    def take_tick(self, records: Mapping[str, Any], before: Mapping[str, Any]) -> Sequence[Any] | None:
+    def take_tick(
+        self, records: Mapping[str, Any], before: Mapping[str, Any], missing: Sequence[int] | None = None
+    ) -> Sequence[Any] | None:
         """As `take` of all records of a tick, by topic, with those of the tick before: what is not there is not late.
+
+        missing: places of the topics that were missing, where the tick is known to have been answered without.
 
         Returns:
             As `take`; None when the tick cannot be answered.
@@ -102,6 +106,9 @@ class StampSynchronizer:
         if pacing is None or pacing.time == self._current:
             return None
         self._advance(pacing)
+        if missing is not None:
+            names = tuple(self._received)
+            self._missing = frozenset(names[place] for place in missing if place < len(names))
         try:
             inputs = [records[topic] for topic in topics.needed]
             if topics.delayed:

@@ -17,7 +17,7 @@ from typing import Any
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
-from formation_gnc.flight.graph import MODULES, ModuleInstance, Row, modules_named
+from formation_gnc.flight.graph import MODULES, ModuleInstance, Row, missing, modules_named
 from formation_gnc.parameters import OWN_OF_ROS, load
 from formation_gnc.recording.provenance import parameters_record
 from formation_gnc.recording.reader import Bag
@@ -176,8 +176,8 @@ class _RecordedTick:
     messages: dict[str, list[bytes]] = field(default_factory=dict)
     swaps: dict[str, list[Event]] = field(default_factory=dict)
     """Changes of parameters by node."""
-    timed: set[str] = field(default_factory=set)
-    """Nodes that finished the tick."""
+    timed: dict[str, list[int]] = field(default_factory=dict)
+    """Nodes that finished the tick, each with the places of the inputs that it had to do without."""
 
 
 class _Replay:
@@ -224,7 +224,7 @@ class _Replay:
         if _is_timing(topic):
             timing = self._decode(topic, data)
             node = f"/{topics.deputy_of(topic)}/{timing.node if timing else ''}"
-            tick.timed.add(node)
+            tick.timed[node] = timing.missing if timing else []
             return node in self._nodes
         return topic in self._outputs
 
@@ -249,7 +249,7 @@ class _Replay:
                 self._sink(topic, record)
         if is_timed:
             spent = round((perf_counter() - started) * NANOSECONDS)
-            self._sink(module.timing, Timing(tick.stamp, module.row.name, spent))
+            self._sink(module.timing, Timing(tick.stamp, module.row.name, spent, missing(inputs)))
         for event in events:
             self._sink(topics.EVENTS.name, event)
 
@@ -258,7 +258,8 @@ class _Replay:
         instance, (earlier, replayed) = module.instance, self._before
         follows = earlier.stamp == tick.stamp - instance.module.parameters.tick_ns
         before = self._those(instance.delayed, earlier, replayed) if follows else {}
-        return instance.collect(self._those(instance.inputs.keys() - instance.delayed, tick, records), before)
+        now = self._those(instance.inputs.keys() - instance.delayed, tick, records)
+        return instance.collect(now, before, tick.timed.get(module.node))
 
     def _those(self, names: Collection[str], tick: _RecordedTick, replayed: Mapping[str, Any]) -> dict[str, Any]:
         """The records of topics at a tick, of those that have one."""

@@ -11,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.service import Service
 
 from formation_gnc.flight import topics
-from formation_gnc.flight.graph import ModuleInstance, Row
+from formation_gnc.flight.graph import ModuleInstance, Row, missing
 from formation_gnc.flight.reception import Information, figures
 from formation_gnc.parameters import dump
 from formation_gnc.records import WARNINGS, EventKind, Timing
@@ -135,7 +135,8 @@ class ModuleNode(ConfiguredNode):
         self._answered += 1
         spent = perf_counter() - started
         self._bus.deliver()
-        self._publish_timing(Timing(inputs[0].time, self._instance.row.name, round(spent * NANOSECONDS)))
+        name, spent_ns = self._instance.row.name, round(spent * NANOSECONDS)
+        self._publish_timing(Timing(inputs[0].time, name, spent_ns, missing(inputs)))
         self._publish_events()
 
     def _publish_events(self) -> None:
