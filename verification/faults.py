@@ -1,6 +1,6 @@
 """Faults with and without supervision: found when, isolated how, and where the flight ends.
 
-`python -m verification.faults [LAW ...]` flies the named laws, LQR without names, and writes docs/verification/faults.md.
+`python -m verification.faults [LAW ...]` flies the named laws, or LQR, and writes docs/verification/faults.md.
 """
 
 import sys
@@ -27,7 +27,7 @@ from verification.figure import Figure
 VICTIM = "deputy1"
 
 HARM, HELD, COAST, STEP = 20.0, 5.0, 86400.0, 60.0
-"""Error that counts as harm, m; up to which the formation is kept, m; time of coasting after the flight, s; its step."""
+"""Error that counts as harm, and up to which the formation is kept, m; time of coasting after the flight, and step, s."""
 
 
 @dataclass(frozen=True)
@@ -123,6 +123,7 @@ class Misled:
         self._kept: Estimate | None = None
 
     def __getattr__(self, name: str) -> Any:
+        """All else of the module."""
         return getattr(self._module, name)
 
     def on_tick(self, measurement: Measurement, mode: ModeState | None = None) -> Estimate | None:
@@ -313,14 +314,14 @@ HEAD = (
 HEADING = f"""# Faults, with and without supervision
 
 Every fault begins after the acquisition of the formation and stays. The first three figures are of the flight without
-supervision (`supervisor.enabled: false`), all others of the flight with it and its default fault table: largest error of the
-true position against the target after the onset, least true distance of any two satellites, delta-v of the satellite with
-the fault. A flight that does not end in `keep` coasts for a day more, with zonal harmonics to degree six: the least distance to
-any other satellite must be above the limit of {FORMATIONS["leader_follower"].limit:g} m.
+supervision (`supervisor.enabled: false`), all others of the flight with it and its default fault table: largest error
+of the true position against the target after the onset, least true distance of any two satellites, delta-v of the
+satellite with the fault. A flight that does not end in `keep` coasts for a day more, with zonal harmonics to degree
+six: the least distance to any other satellite must be above {FORMATIONS["leader_follower"].limit:g} m.
 
-A fault does harm if the error without supervision exceeds {HARM:g} m or a separation falls below half of the planned. Such a
-fault has to be found before half of that error, and to end `kept` (in `keep`, within {HELD:g} m) or `safe`. What falls short of
-that is marked. Flown in-process by `python -m verification.faults`.
+A fault does harm if the error without supervision exceeds {HARM:g} m or a separation falls below half of the planned.
+Such a fault has to be found before half of that error, and to end `kept` (in `keep`, within {HELD:g} m) or `safe`.
+What falls short of that is marked. Flown in-process by `python -m verification.faults`.
 """
 
 

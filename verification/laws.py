@@ -56,6 +56,7 @@ class Clocked:
         self.take_events = module.take_events
 
     def __getattr__(self, name: str) -> Any:
+        """All else of the module."""
         return getattr(self._module, name)
 
     def on_tick(self, *inputs: Any) -> Any:

@@ -21,7 +21,7 @@ from formation_gnc.transport.node import ConfiguredNode, rejected
 from formation_gnc.types import NANOSECONDS
 
 SETTLING = 0.1
-"""Wall time (s) for which a node that finds messages from before its start waits for more of them."""
+"""Wall time (s) without another one after which a node that finds messages from before its start has all of them."""
 
 SOON = 1_000_000
 """The same (ns) for a node that has been busy: what has come meanwhile is received within this time."""
@@ -96,17 +96,19 @@ class ModuleNode(ConfiguredNode):
     def _receive(self, topic: str, record: Any, about: Information) -> None:
         published = about["source_timestamp"]
         is_behind = topic == self._instance.needed[0] and self._instance.synchronizer.unanswered is not None
-        if not self._waiting and not is_behind and time_ns() - published < LATE:
+        is_late = time_ns() - published >= LATE
+        if not self._waiting and not is_behind and not is_late:
+            self._catch_up_soon.timer_period_ns = SOON
             self._take(topic, record)
             return
-        if not self._waiting:
+        # Until a node has caught up, what was before its start may come in parts.
+        if not self._waiting or (is_late and self._catch_up_soon.timer_period_ns != SOON):
             self._catch_up_soon.reset()
         self._waiting.setdefault(topic, []).append((published, record))
 
     def _catch_up(self) -> None:
         """Go on with the last tick of those that wait, or with what the module cannot do without."""
         self._catch_up_soon.cancel()
-        self._catch_up_soon.timer_period_ns = SOON
         waiting, self._waiting = self._waiting, {}
         records = {topic: _of_latest_run(messages) for topic, messages in waiting.items()}
         pace = self._instance.needed[0]

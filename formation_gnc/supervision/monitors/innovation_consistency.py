@@ -14,8 +14,8 @@ WINDOW = 60
 class InnovationConsistency(Monitor):
     """Sum over a window of the innovations squared, normalised (NIS), against chi-square.
 
-    What the gate refused counts with its square, up to 25; what is isolated does not count. An inflation of the covariance by the filter is a failure by
-    the filter's own test.
+    What the gate refused counts with its square, up to 25; what is isolated does not count. An inflation of the
+    covariance by the filter is a failure by the filter's own test.
 
     Smaller ones are no fault: process noise bounds what is not modelled, as the Earth's harmonics far from the chief.
 
