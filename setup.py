@@ -3,7 +3,7 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 NAME = "formation_gnc"
-MODULES = ["navigation", "guidance", "controller"]  # rows of formation_gnc/flight/graph.py
+MODULES = ["navigation", "guidance", "controller", "supervisor"]  # rows of formation_gnc/flight/graph.py
 NODES = ["plant", "satellite", "display", "recorder", "replay"]
 
 

@@ -4,7 +4,7 @@ A record's fields carry them as metadata; whoever decodes a message checks them 
 """
 
 import dataclasses
-from collections.abc import Callable, Sized
+from collections.abc import Callable, Iterable, Sized
 from functools import cache
 from math import isfinite
 from typing import Any
@@ -69,6 +69,13 @@ def at_most(count: int, element: Bound | None = None) -> Bound:
     return check
 
 
+def among(names: Iterable[str]) -> Bound:
+    """One of some texts."""
+    allowed = frozenset(map(str, names))
+    words = f"one of {', '.join(sorted(allowed))}"
+    return lambda value: "" if value in allowed else words
+
+
 def each(count: int) -> Bound:
     """A list of at most so many records, each within its own bounds."""
 
@@ -86,13 +93,16 @@ def violation(record: Any) -> str:
         value = getattr(record, name)
         allowed = bound(value)
         if allowed:
-            given = (
-                f"{len(value)} values"
-                if isinstance(value, Sized) and len(value) > 6
-                else np.array2string(np.asarray(value), max_line_width=200)
-            )
-            return f"{name} must be {allowed}, not {given}"
+            return f"{name} must be {allowed}, not {_words(value)}"
     return ""
+
+
+def _words(value: Any) -> str:
+    if isinstance(value, str):
+        return repr(value) if len(value) <= 60 else f"{len(value)} characters"
+    if isinstance(value, Sized) and len(value) > 6:
+        return f"{len(value)} values"
+    return np.array2string(np.asarray(value), max_line_width=200)
 
 
 def checked[T](record: T) -> T:

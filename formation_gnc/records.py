@@ -45,6 +45,7 @@ class Rejection(StrEnum):
 
     NOT_FINITE = "not_finite"
     GATE = "gate"
+    ISOLATED = "isolated"
     FUTURE = "future"
     LATE = "late"
     DUPLICATE = "duplicate"
@@ -78,6 +79,9 @@ class EventKind(IntEnum):
     THRUSTERS = 15
     END = 16
     FAULT = 17
+    MODE = 18
+    DETECTION = 19
+    RESPONSE = 20
 
 
 WARNINGS = frozenset(
@@ -91,6 +95,8 @@ WARNINGS = frozenset(
         EventKind.WARNING,
         EventKind.MISS,
         EventKind.THRUSTERS,
+        EventKind.DETECTION,
+        EventKind.RESPONSE,
     }
 )
 """Kinds of events that somebody should look at."""
@@ -131,11 +137,11 @@ class Innovation(Record):
 
     message: ClassVar = "Innovation"
 
-    sensor: str
-    values: list[float]
-    standard_deviations: list[float]
+    sensor: str = field(metadata=bounded(at_most(NAME_LENGTH)))
+    values: list[float] = field(metadata=bounded(at_most(LIST_LENGTH)))
+    standard_deviations: list[float] = field(metadata=bounded(at_most(LIST_LENGTH)))
     test_ratio: float
-    rejection: str = ""
+    rejection: str = field(default="", metadata=bounded(at_most(NAME_LENGTH)))
 
 
 @dataclass(slots=True)
@@ -144,7 +150,7 @@ class RejectionCount(Record):
 
     message: ClassVar = "RejectionCount"
 
-    reason: str  # Rejection
+    reason: str = field(metadata=bounded(at_most(NAME_LENGTH)))  # Rejection
     count: int
 
 
@@ -167,16 +173,37 @@ class Estimate(NavigationState):
 
     covariance: Matrix = field(metadata={"shape": (6, 6)})
     eclipse: bool
-    innovations: list[Innovation]
+    innovations: list[Innovation] = field(metadata=bounded(each(LIST_LENGTH)))
     nis: float
     status: int  # EstimateStatus
-    rejections: list[RejectionCount] = field(default_factory=list)
+    rejections: list[RejectionCount] = field(default_factory=list, metadata=bounded(each(LIST_LENGTH)))
     unobservable_direction: Vector = field(default_factory=lambda: np.zeros(6))  # (6,)
-    unobservable: str = ""
+    unobservable: str = field(default="", metadata=bounded(at_most(NAME_LENGTH)))
 
 
 NO_ECLIPSES: Times = np.empty((0, 2), dtype=np.int64)
 NO_NEIGHBOURS: Matrix = np.empty((0, 6))
+
+
+@dataclass(slots=True)
+class Separation(Record):
+    """Predicted least distances of a deputy to the other satellites of its fleet."""
+
+    message: ClassVar = "Separation"
+    frame_id: ClassVar = "hill"
+
+    time: int
+    planned: float
+    planned_time: int
+    planned_neighbour: str = field(metadata=bounded(at_most(NAME_LENGTH)))
+    passive: float
+    passive_time: int
+    passive_neighbour: str = field(metadata=bounded(at_most(NAME_LENGTH)))
+
+    @property
+    def nearest(self) -> str:
+        """Name of the neighbour at the lesser of both distances."""
+        return self.planned_neighbour if self.planned <= self.passive else self.passive_neighbour
 
 
 @dataclass(slots=True)
@@ -194,6 +221,9 @@ class Target(Record):
     eclipses: Times = field(default_factory=lambda: NO_ECLIPSES, metadata=bounded(at_most(ROWS)))  # (N, 2), by Interval
     neighbours: Matrix = field(default_factory=lambda: NO_NEIGHBOURS, metadata=bounded(at_most(ROWS, finite_state)))
     """(N, 6), a row for each RelativeState."""
+    reconfiguring: bool = False
+    separation: list[Separation] = field(default_factory=list, metadata=bounded(each(1)))
+    """Predicted at this tick; empty where none is due."""
 
 
 @dataclass(slots=True)
@@ -215,34 +245,14 @@ class Status(Record):
     frame_id: ClassVar = "hill"
 
     time: int
-    algorithm: str
+    algorithm: str = field(metadata=bounded(at_most(NAME_LENGTH)))
     demand: Vector  # (3,)
     saturated: list[bool]
-    solver: str = ""
+    solver: str = field(default="", metadata=bounded(at_most(NAME_LENGTH)))
     iterations: int = 0
     cost: float = 0.0
-    fallback: str = ""
-
-
-@dataclass(slots=True)
-class Separation(Record):
-    """Predicted least distances of a deputy to the other satellites of its fleet."""
-
-    message: ClassVar = "Separation"
-    frame_id: ClassVar = "hill"
-
-    time: int
-    planned: float
-    planned_time: int
-    planned_neighbour: str
-    passive: float
-    passive_time: int
-    passive_neighbour: str
-
-    @property
-    def nearest(self) -> str:
-        """Name of the neighbour at the lesser of both distances."""
-        return self.planned_neighbour if self.planned <= self.passive else self.passive_neighbour
+    fallback: str = field(default="", metadata=bounded(at_most(NAME_LENGTH)))
+    mode: str = field(default="", metadata=bounded(at_most(NAME_LENGTH)))  # Mode
 
 
 @dataclass(slots=True)
@@ -329,3 +339,4 @@ class Timing(Record):
     time: int
     node: str
     compute_time: int
+    missing: list[int] = field(default_factory=list, metadata=bounded(at_most(LIST_LENGTH)))

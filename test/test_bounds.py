@@ -8,6 +8,7 @@ import pytest
 
 from formation_gnc.bounds import violation
 from formation_gnc.errors import ConfigurationError
+from formation_gnc.mode_records import ModeState, Restriction
 from formation_gnc.records import Measurement, NavigationState, Reading, Record, SatelliteTruth, Target, Truth
 from formation_gnc.transport.conversion import received, to_cdr
 
@@ -17,6 +18,7 @@ ESTIMATE = NavigationState(0, STATE, CHIEF, 10.0)
 TARGET = Target(0, "ring", STATE, 60 * 10**9, np.tile(STATE, (3, 1)))
 MEASUREMENT = Measurement(0, "deputy1", CHIEF, [Reading("radius", [7e6], 0)], np.zeros(3), 10.0, False, False, STATE)
 TRUTH = Truth(0, CHIEF, [SatelliteTruth("deputy1", CHIEF, STATE, np.zeros(3), 10.0, False)])
+MODE = ModeState(0, "keep", "acquire", 0, restrictions=[Restriction("sensor", "radius", "innovation")])
 
 
 def with_nan(values: Any) -> Any:
@@ -25,7 +27,7 @@ def with_nan(values: Any) -> Any:
     return broken
 
 
-@pytest.mark.parametrize("record", [ESTIMATE, TARGET, MEASUREMENT, TRUTH], ids=lambda each: type(each).__name__)
+@pytest.mark.parametrize("record", [ESTIMATE, TARGET, MEASUREMENT, TRUTH, MODE], ids=lambda each: type(each).__name__)
 def test_what_flies_is_within_its_bounds(record: Record) -> None:
     assert violation(record) == ""
 
@@ -46,6 +48,9 @@ FORGED = {
     "endless readings": replace(MEASUREMENT, readings=MEASUREMENT.readings * 2000),
     "endless reading": replace(MEASUREMENT, readings=[Reading("radius", [0.0] * 2000, 0)]),
     "endless name": replace(MEASUREMENT, deputy="x" * 5000),
+    "unknown mode": replace(MODE, mode="party"),
+    "endless restrictions": replace(MODE, restrictions=MODE.restrictions * 2000),
+    "unknown restriction": replace(MODE, restrictions=[Restriction("planet", "radius", "")]),
     "truth not finite": replace(TRUTH, deputies=[replace(TRUTH.deputies[0], relative_state=with_nan(STATE))]),
 }
 

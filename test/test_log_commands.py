@@ -144,6 +144,28 @@ def test_an_unchanged_replay_gives_the_recorded_bits(
     assert again.metadata["parameters /deputy1/controller"] == Bag(reference).metadata["parameters /deputy1/controller"]
 
 
+def test_a_module_that_did_not_fly_is_left_out_of_a_replay_and_told(
+    reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As in a bag that was recorded before there was that module."""
+    bag, before = Bag(reference), tmp_path / "before"
+    metadata = {name: values for name, values in bag.metadata.items() if name != "parameters /deputy1/supervisor"}
+    with BagWriter(before, metadata) as writer:
+        for topic in bag.topics.keys() - {"/deputy1/mode", "/deputy1/health"}:
+            schema, channel = bag.definition(topic)
+            assert schema is not None
+            writer.add_defined_topic(topic, TopicDefinition(schema.name, schema.data, metadata=channel.metadata))
+        for topic, data, stamp in bag.messages():
+            if topic not in ("/deputy1/mode", "/deputy1/health"):
+                writer.write(topic, data, stamp, 2)
+    replayed(before, tmp_path / "again")
+    printed = capsys.readouterr()
+    assert "/deputy1/supervisor is left out: the bag has neither parameters nor records of it" in printed.out
+    assert Bag(tmp_path / "again").topics["/deputy1/thrust"].count == bag.topics["/deputy1/thrust"].count
+    assert main(["replay", str(before), "--bag", str(tmp_path / "no"), "--nodes", "supervisor"]) == 2
+    assert "has no parameters of /deputy1/supervisor" in capsys.readouterr().err
+
+
 @pytest.mark.thorough
 def test_scheduled_and_manual_changes_replay_at_their_tick(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "swaps.yaml").write_text(find_scenario("leader_follower").read_text() + SWAPS)
@@ -258,7 +280,7 @@ def test_a_changed_replay_differs_only_where_it_was_changed(
 ) -> None:
     changed = tmp_path / "changed.yaml"
     changed.write_text("/**/controller: {ros__parameters: {algorithm: coast}}\n")
-    status, again = replayed(reference, tmp_path / "again", "--params", str(changed))
+    status, again = replayed(reference, tmp_path / "again", "--params", str(changed), "--nodes", "controller")
     assert status == 0
     differing = [difference.topic for difference in identical(Bag(reference), again, gnc_topics(again))]
     assert differing == ["/deputy1/status", "/deputy1/thrust"]

@@ -24,7 +24,7 @@ from formation_gnc.sil.scenario import load_scenario
 from formation_gnc.transport.conversion import type_name
 
 ROOT = Path(__file__).resolve().parents[1]
-NODES = {"plant", "navigation", "guidance", "controller", "recorder"}
+NODES = {"plant", "navigation", "guidance", "controller", "supervisor", "recorder"}
 
 needs_set_up = pytest.mark.skipif(not (ROOT / "install/.ready").exists(), reason="needs `make setup`")
 
@@ -314,7 +314,7 @@ def launch_double(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
 def test_the_launch_file_starts_all_deputies_of_any_scenario(launch_double, scenario, composed):
     nodes = started(launch_double, scenario=scenario, use_composition=composed)
     deputies = load_scenario(scenario).plant.deputies
-    parts = {"satellite"} if composed == "true" else {"navigation", "guidance", "controller"}
+    parts = {"satellite"} if composed == "true" else {"navigation", "guidance", "controller", "supervisor"}
     assert {(node.namespace, node.executable) for node in nodes} == {
         ("", "plant"),
         ("", "recorder"),

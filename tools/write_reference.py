@@ -22,6 +22,9 @@ from formation_gnc.plant.parameters import PlantParameters
 from formation_gnc.recording.layout import LAYOUT, foxglove_layout
 from formation_gnc.recording.parameters import RecorderParameters
 from formation_gnc.recording.player import ReplayParameters
+from formation_gnc.supervision import modes
+from formation_gnc.supervision import registry as monitors
+from formation_gnc.supervision.supervisor import default_fault_table
 from formation_gnc.transport.markers import DisplayParameters
 from tools.architecture import FOUNDATION, PACKAGE, ROOT, WINGS, imports, place, wing
 
@@ -168,6 +171,9 @@ def tick_diagram() -> str:
         if row.takes_of_others:
             names = ", ".join(each.topic.name for each in row.takes_of_others)
             lines.append(f"  Note over {row.name}: in a fleet, also {names} of every other satellite")
+        if row.takes_of_before:
+            names = ", ".join(each.topic.name for each in row.takes_of_before)
+            lines.append(f"  Note over {row.name}: with {names} of the tick before")
         for topic in row.gives:
             arrow = "->>" if topic.every_tick else "-->>"
             takers = [*_takers(topic), *(["plant"] if topic == COMMAND else [])]
@@ -196,6 +202,7 @@ def nodes_table() -> str:
     ]
     for row in GRAPH:
         takes = [_code(each.topic) for each in row.takes]
+        takes += [f"of the tick before {_code(each.topic)}" for each in row.takes_of_before]
         takes += [f"in a fleet {_code(each.topic)} of every other deputy" for each in row.takes_of_others]
         gives = [f"in a fleet {_code(topic)}" if topic.fleet_only else _code(topic) for topic in row.gives]
         rows.append((row.name, takes, [*gives, *map(_code, (topics.TIMING, topics.EVENTS))]))
@@ -260,12 +267,23 @@ def filled(page: Path, parts: dict[str, str]) -> str:
 
 ARCHITECTURE = DOCS / "architecture.md"
 TOPICS = DOCS / "reference" / "topics.md"
+SUPERVISION = DOCS / "theory" / "supervision.md"
 
 PAGES: dict[Path, Callable[[], str]] = {
     DOCS / "reference" / "parameters.md": parameters_page,
     DOCS / "reference" / LAYOUT: lambda: foxglove_layout(["deputy1"]),
     TOPICS: lambda: filled(TOPICS, {"nodes": nodes_table(), "topics": topics_table()}),
     ARCHITECTURE: lambda: filled(ARCHITECTURE, {"wings": wings_diagram(), "tick": tick_diagram()}),
+    SUPERVISION: lambda: filled(
+        SUPERVISION,
+        {
+            "modes": modes.diagram(),
+            "transitions": modes.table(),
+            "refusals": modes.refusals_table(),
+            "monitors": monitors.table(),
+            "faults": default_fault_table(),
+        },
+    ),
 }
 """Generated pages, or pages with generated parts, and what should stand in them."""
 

@@ -55,6 +55,10 @@ class Clocked:
         self.times: list[float] = []
         self.take_events = module.take_events
 
+    def __getattr__(self, name: str) -> Any:
+        """All else of the module."""
+        return getattr(self._module, name)
+
     def on_tick(self, *inputs: Any) -> Any:
         """The module's answer."""
         started = thread_time()

@@ -1,13 +1,18 @@
 """What flies on the truth in place of estimates."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from formation_gnc.mode_records import ModeState
 from formation_gnc.plant.plant import Plant
 from formation_gnc.records import Estimate, EstimateStatus, Event, Measurement
 
 
 class Omniscient:
-    """Stands where the navigation does, and gives the truth as the estimate."""
+    """Stands where the navigation does, and gives the truth as the estimate, in any mode."""
+
+    events: Sequence[Event] = ()
 
     def __init__(self, plant: Plant, name: str) -> None:
         """For a deputy of this plant."""
@@ -19,7 +24,7 @@ class Omniscient:
         """Nothing happens to it."""
         return []
 
-    def on_tick(self, measurement: Measurement) -> Estimate:
+    def on_tick(self, measurement: Measurement, mode: ModeState | None = None) -> Estimate:
         """The true state at the tick."""
         deputy = self._plant.truth().deputies[self._index]
         return Estimate(

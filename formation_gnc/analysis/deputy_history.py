@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation_gnc.analysis.sensor_series import Channel, SensorSeries
+from formation_gnc.analysis.supervision_history import SupervisionHistory
 from formation_gnc.analysis.thinning import Thinned, ThinnedByKey, TickSelection
 from formation_gnc.analysis.trajectory import UnseenThrust
 from formation_gnc.flight import topics
@@ -48,6 +49,7 @@ class DeputyHistory:
         innovations: (n, 3) time, value and standard deviation by sensor and component.
         timing: (n, 2) time and compute time (ms) by module.
         solver: (n, 2) time and iterations.
+        supervision: modes, faults and responses; times in s.
     """
 
     def __init__(self, index: int, name: str, selection: TickSelection, unseen: UnseenThrust) -> None:
@@ -68,11 +70,14 @@ class DeputyHistory:
         self._timing, self._solver = ThinnedByKey[str](2), Thinned(2)
         self._seen_delta_v, self._seen_impulse, self._in_eclipse = 0.0, np.zeros(3), False
         self.eclipses: list[list[float]] = []
+        self.supervision = SupervisionHistory()
         self.handlers: dict[str, Handler] = {
             topics.ESTIMATE.name: Handler(self._add_estimate, ("relative_state", "covariance", "innovations")),
             topics.TARGET.name: Handler(self._add_target, ("relative_state",)),
             topics.MEASUREMENT.name: Handler(self._readings.add, ("readings",)),
             topics.STATUS.name: Handler(self._add_status, ("iterations",)),
+            topics.MODE.name: Handler(self.supervision.add_modes, ("mode", "reason", "restrictions")),
+            topics.HEALTH.name: Handler(self.supervision.add_health, ("statuses",)),
             topics.TIMING.name: Handler(self._add_timing, ("node", "compute_time")),
         }
         """By topic, in the deputy's namespace."""
@@ -130,6 +135,7 @@ class DeputyHistory:
         """
         for eclipse in self.eclipses:
             eclipse[1] = min(eclipse[1], end)
+        self.supervision.finish(end * HOUR)
         stamps = self._truth["stamp_ns"]
         unseen = self._unseen.delta_v_until(self._unseen.stamps[-1:], self._selection.tick_ns * 1e-9)
         self.total_delta_v = self._seen_delta_v + float(unseen.sum())

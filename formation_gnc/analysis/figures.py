@@ -40,6 +40,8 @@ class DeputyFigures:
     """Ticks on which the law's own answer could not be used."""
     law: str
     """Name of the control law of the last command; empty without one."""
+    mode: str
+    """Mode at the end; empty without a supervisor."""
 
     def by_name(self) -> dict[str, float | str]:
         """Figures by name, each axis and each bound in words of its own."""
@@ -92,6 +94,7 @@ def deputy_figures(name: str, path: Trajectory, events: Fields | None) -> Deputy
         float(path.applied_time[-1] if len(path.applied_time) else 0.0),
         path.period,
         float(changes[-1]) if len(changes) else 0.0,
+        path.mode,
     )
     commanded = path.commanded_delta_v
     return DeputyFigures(
@@ -110,6 +113,7 @@ def deputy_figures(name: str, path: Trajectory, events: Fields | None) -> Deputy
         saturated=path.saturated,
         fallbacks=path.fallbacks,
         law=path.law,
+        mode=path.mode,
     )
 
 

@@ -149,6 +149,7 @@ def _figure_table(bag: Bag) -> str:
     values = {name: each.by_name() for name, each in deputies.items()}
     head = "".join(f"<th>{escape(name)}</th>" for name in deputies)
     rows = [("control law at the end", [each.law for each in deputies.values()])]
+    rows += [("mode at the end", [each.mode for each in deputies.values()])]
     rows += [(figure.label, [figure.text(values[name][figure.name]) for name in deputies]) for figure in FIGURES]
     body = "".join(
         f"<tr><th>{escape(label)}</th>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"

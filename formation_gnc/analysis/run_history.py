@@ -1,7 +1,7 @@
 """History of a recorded run: read once, thinned while it is read, for bags of any length."""
 
 from collections import Counter
-from itertools import combinations, islice
+from itertools import combinations
 
 import numpy as np
 
@@ -13,7 +13,10 @@ from formation_gnc.analysis.trajectory import deputies_of, event_kinds, unseen_t
 from formation_gnc.flight import topics
 from formation_gnc.recording.fields import Fields
 from formation_gnc.recording.reader import Bag
+from formation_gnc.records import EventKind, kind_name
 from formation_gnc.types import Matrix, Vector
+
+FAULT = kind_name(EventKind.FAULT)
 
 EVENTS = 300
 """Events kept at most."""
@@ -100,5 +103,10 @@ class RunHistory:
         self.event_counts.update(kinds)
         subjects = batch["subject"] if "subject" in batch else [""] * len(kinds)  # none in bags of 0.1.0
         rows = zip(batch["time"], kinds, batch["node"], subjects, batch["detail"], strict=True)
-        for time, kind, *texts in islice(rows, EVENTS - len(self.events)):
-            self.events.append(Mark(float(time) / HOUR, kind, *map(str, texts)))
+        marks = (Mark(float(time) / HOUR, kind, *map(str, texts)) for time, kind, *texts in rows)
+        for mark in marks:
+            if mark.kind == FAULT and mark.subject in self.deputies:
+                injected = self.deputies[mark.subject].supervision.injected
+                injected.extend([mark][: EVENTS - len(injected)])
+            if len(self.events) < EVENTS:
+                self.events.append(mark)

@@ -53,6 +53,8 @@ class Trajectory:
     """Ticks on which the law's own answer could not be used."""
     law: str
     """Name of the control law of the last command; empty without one."""
+    mode: str
+    """Last mode; empty without a supervisor."""
 
     @property
     def error(self) -> Matrix:
@@ -193,6 +195,7 @@ OF_DEPUTY: dict[Any, Selection] = {
             status["algorithm"][-1:],
         ),
     ),
+    topics.MODE: (("mode",), lambda mode: (mode["mode"][-1:],)),
 }
 """What is read of each of a deputy's topics."""
 
@@ -230,6 +233,7 @@ def assemble(
     commanded_time, commanded, *_ = columns.get(topics.THRUST, _NO_COLUMNS)
     commanded = commanded / np.interp(commanded_time, true_stamps * 1e-9, masses)
     saturated, fallbacks, laws, *_ = columns.get(topics.STATUS, _NO_COLUMNS)
+    modes, *_ = columns.get(topics.MODE, _NO_COLUMNS)
     return Trajectory(
         time=stamps * 1e-9,
         truth=states[true_rows],
@@ -247,6 +251,7 @@ def assemble(
         saturated=float(saturated.mean()) if len(saturated) else 0.0,
         fallbacks=int(np.count_nonzero(fallbacks)),
         law=str(laws[-1]) if len(laws) else "",
+        mode=str(modes[-1]) if len(modes) else "",
     )
 
 

@@ -1,4 +1,4 @@
-"""Verdict on a recorded run: whether a deputy holds its formation, is on its way to it, or has lost it."""
+"""Verdict on a recorded run: whether a deputy holds its formation, is on its way to it, has given it up or lost it."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -6,6 +6,7 @@ from math import inf
 
 import numpy as np
 
+from formation_gnc.mode_records import Mode
 from formation_gnc.types import Vector
 
 HELD = 0.5
@@ -18,11 +19,16 @@ SILENCE = 0.1
 """Share of the run at its end without an answer after which a deputy is lost."""
 
 
+GIVEN_UP = frozenset({Mode.STANDBY, Mode.AVOID, Mode.SAFE})
+"""Modes in which a deputy does not follow its target."""
+
+
 class Verdict(StrEnum):
     """State of a deputy at the end of a run."""
 
     HELD = "held"
     ACQUIRING = "acquiring"
+    GIVEN_UP = "given up"
     LOST = "lost"
 
 
@@ -37,6 +43,7 @@ class ErrorHistory:
         end: of the run, s.
         period: of the chief's orbit, s.
         changed: time of the latest change of the target in flight, s; 0 for none.
+        mode: at the end; empty without a supervisor.
     """
 
     time: Vector
@@ -45,6 +52,7 @@ class ErrorHistory:
     end: float
     period: float
     changed: float = 0.0
+    mode: str = ""
 
     @property
     def _window(self) -> float:
@@ -67,11 +75,14 @@ class ErrorHistory:
     def verdict(self) -> Verdict:
         """State at the end of the run.
 
-        A deputy has an orbit to arrive at a new target. After that it has lost the formation when its error
-        exceeds the formation's size and does not shrink, or when it does not answer any more.
+        A deputy that does not answer any more has lost the formation; one that by its mode does not follow its
+        target has given it up. Others have an orbit to arrive at a new target. After that they have lost the
+        formation when their error exceeds the formation's size and does not shrink.
         """
         if self.end - self.time[-1] > SILENCE * self.end:
             return Verdict.LOST
+        if self.mode in GIVEN_UP:
+            return Verdict.GIVEN_UP
         size, peak = float(np.sqrt(np.mean(self.size**2))), self._peak(0)
         if peak <= HELD * size:
             return Verdict.HELD

@@ -25,8 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--nodes",
         metavar="NAMES",
-        default=",".join(MODULES),
-        help=f"which to fly again, with commas (default: {','.join(MODULES)})",
+        help=f"which to fly again, with commas (default: those of {','.join(MODULES)} that the bag has parameters of)",
     )
     parser.add_argument(
         "--params", metavar="FILE", type=Path, help="ROS 2 parameter file that overrides what is recorded"
@@ -59,7 +58,7 @@ def differences_of_replay(bag: Bag) -> list[Difference]:
 
     with TemporaryDirectory(prefix="formation_gnc-") as directory:
         output = Path(directory) / "replay"
-        replay_into(bag, output, list(MODULES), None)
+        replay_into(bag, output, None, None)
         replayed = Bag(output)
         return identical(bag, replayed, gnc_topics(bag, replayed))
 
@@ -68,7 +67,7 @@ def _replay(bag: Bag, output: Path, options: argparse.Namespace) -> bool:
     """Replay one run and compare; returns whether both are identical."""
     from formation_gnc.transport.replay_recorder import replay_into
 
-    remarks = replay_into(bag, output, options.nodes.split(","), options.params)
+    remarks = replay_into(bag, output, options.nodes.split(",") if options.nodes else None, options.params)
     print(f"bag: {output}")
     for remark in remarks:
         print(remark)

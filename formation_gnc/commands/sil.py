@@ -1,7 +1,8 @@
 """Fly a scenario in software-in-the-loop, record it and print how well it flew.
 
 The node graph runs as real processes over DDS in a ROS domain of its own; with --in-process the same
-objects run in this process, to the same bits and faster. Exit status 3 means that the formation is lost.
+objects run in this process, to the same bits and faster. Exit status 3 means that the formation is lost, 4 that
+a satellite has given it up: its supervisor had it leave the target, for a mode that is safe.
 """
 
 import argparse
@@ -34,6 +35,9 @@ if TYPE_CHECKING:
 
 LOST_STATUS = 3
 """Exit status of a run whose formation is lost."""
+
+GIVEN_UP_STATUS = 4
+"""Exit status of a run in which a satellite has given the formation up, and none has lost it."""
 
 PATIENCE = 3.0
 """Wall time (s) between lines about what the run waits for."""
@@ -82,7 +86,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="replay the run, write its page, which tells whether that gave the same bits, and on a desktop open it",
     )
-    parser.add_argument("--accept-lost", action="store_true", help="exit with status 0 also when the formation is lost")
+    parser.add_argument("--respawn", action="store_true", help="start a deputy's node again when it has died")
+    parser.add_argument(
+        "--accept-lost", action="store_true", help="exit with status 0 also when the formation is lost or given up"
+    )
     parser.add_argument("--json", action="store_true", help="print the figures as one JSON object")
 
 
@@ -99,7 +106,7 @@ def fly(scenario: Scenario, options: argparse.Namespace) -> int:
     console = Console(stderr=True, highlight=False)
     for warning in warnings(scenario):
         console.print(f"warning: {warning}", soft_wrap=True)
-    on_graph = partial(_fly_on_graph, composed=options.composed, display=options.display)
+    on_graph = partial(_fly_on_graph, composed=options.composed, display=options.display, respawn=options.respawn)
     try:
         speedup = (_fly_in_process if options.in_process else on_graph)(scenario, bag, console)
     except KeyboardInterrupt:
@@ -179,7 +186,9 @@ class _Display:
             self.say(message)
 
 
-def _fly_on_graph(scenario: Scenario, bag: Path, console: Console, composed: bool, display: bool) -> float:
+def _fly_on_graph(
+    scenario: Scenario, bag: Path, console: Console, composed: bool, display: bool, respawn: bool
+) -> float:
     from formation_gnc.sil.report import Report
     from formation_gnc.transport.launcher import LaunchOptions, fly_graph
 
@@ -189,7 +198,7 @@ def _fly_on_graph(scenario: Scenario, bag: Path, console: Console, composed: boo
         shown.show(report.message, report.figures.get("tick", 0.0), report.figures.get("speedup", 0.0))
 
     with _Display(console, scenario.plant.ticks) as shown:
-        options = LaunchOptions(bag.absolute(), composed, display)
+        options = LaunchOptions(bag.absolute(), composed, display, respawn)
         last = fly_graph(scenario, options, show, shown.say)
         return last.figures.get("speedup", 0.0)
 
@@ -226,6 +235,7 @@ def _fly_in_process(scenario: Scenario, bag: Path, console: Console) -> float:
 
 
 def _summarise(scenario: Scenario, bag: Path, speedup: float, options: argparse.Namespace) -> int:
+    from formation_gnc.analysis.fault_figures import fault_figures
     from formation_gnc.analysis.figures import figures
     from formation_gnc.analysis.overview import draw_overview
     from formation_gnc.analysis.run_history import RunHistory
@@ -242,7 +252,9 @@ def _summarise(scenario: Scenario, bag: Path, speedup: float, options: argparse.
     }
     picture = draw_overview(flown, bag / "overview.png", scenario.name)
     page = _page(recorded, flown, bag / "report.html", scenario.name) if options.page else None
-    status = LOST_STATUS if result.verdict is Verdict.LOST and not options.accept_lost else 0
+    statuses = {Verdict.LOST: LOST_STATUS, Verdict.GIVEN_UP: GIVEN_UP_STATUS}
+    status = 0 if options.accept_lost else statuses.get(result.verdict, 0)
+    faults = fault_figures(flown)
     if options.json:
         summary = {
             "scenario": scenario.name,
@@ -254,6 +266,7 @@ def _summarise(scenario: Scenario, bag: Path, speedup: float, options: argparse.
             "lost": recorded.lost,
             "bag": str(bag),
             "picture": str(picture),
+            "faults": faults,
             "deputies": {name: dataclasses.asdict(each) for name, each in result.deputies.items()},
         }
         if page is not None:
@@ -268,8 +281,13 @@ def _summarise(scenario: Scenario, bag: Path, speedup: float, options: argparse.
     _print_figures(console, f"{scenario.name}, seed {scenario.plant.seed}", result)
     lost = f", {recorded.lost} messages not recorded" if recorded.lost else ""
     console.print(f"{result.ticks} ticks, {result.misses} missed{lost}, {speedup:,.0f} x real time")
-    lost_deputies = [name for name, each in result.deputies.items() if each.verdict is Verdict.LOST]
-    console.print(f"formation {result.verdict}" + (f": {', '.join(lost_deputies)}" if lost_deputies else ""))
+    worst = [name for name, each in result.deputies.items() if each.verdict is result.verdict]
+    console.print(f"formation {result.verdict}" + (f": {', '.join(worst)}" if result.verdict in statuses else ""))
+    for name, words in faults.items():
+        console.print(f"{name}: modes {' - '.join(words['modes']) or 'unknown'}", soft_wrap=True)
+        for key in ("injected", "detected", "answered"):
+            for line in words[key]:
+                console.print(f"  {key} {line}", soft_wrap=True)
     for label, separation in separations.items():
         if separation is not None:
             pair = " and ".join(separation.pair)

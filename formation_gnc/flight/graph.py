@@ -4,7 +4,7 @@ Nodes, composed satellites, in-process runner, replay, launcher, recorder, layou
 read from it. A new module is its class, a row here and its executable's name in `setup.py`.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pkgutil import resolve_name
@@ -13,7 +13,7 @@ from typing import Any
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
 from formation_gnc.flight.module import FlightModule
-from formation_gnc.flight.synchronizer import StampSynchronizer
+from formation_gnc.flight.synchronizer import InputTopics, StampSynchronizer
 from formation_gnc.flight.topics import Topic
 from formation_gnc.records import Event, NavigationState
 
@@ -40,7 +40,10 @@ class Row:
     parameters_path: the same of the schema of its parameters.
     takes: needed at every tick, from the own satellite.
     gives: in the order in which the module returns them; the first answers the tick.
+    takes_of_before: of the tick before, from the own satellite; dispensable, None where there is none.
     takes_of_others: from the fleet's other satellites; dispensable, None where one is silent.
+
+    A module is given its inputs in this order: `takes`, `takes_of_before`, `takes_of_others`.
     """
 
     name: str
@@ -48,6 +51,7 @@ class Row:
     parameters_path: str
     takes: tuple[Input, ...]
     gives: tuple[Topic, ...]
+    takes_of_before: tuple[Input, ...] = ()
     takes_of_others: tuple[Input, ...] = ()
 
     @cached_property
@@ -71,6 +75,7 @@ PLANT = "/plant"
 """Full name of the plant's node."""
 
 NAVIGATION_STATE = Input(topics.ESTIMATE, NavigationState)
+MODE = Input.whole(topics.MODE)
 
 MODULES: dict[str, Row] = {}
 """The table: rows by name, in the order in which they answer within a tick."""
@@ -96,6 +101,7 @@ for _row in (
         "formation_gnc.navigation.navigation_filter:NavigationFilter",
         "formation_gnc.navigation.parameters:NavigationParameters",
         takes=(Input.whole(topics.MEASUREMENT),),
+        takes_of_before=(MODE,),
         gives=(topics.ESTIMATE,),
     ),
     Row(
@@ -103,6 +109,7 @@ for _row in (
         "formation_gnc.guidance.guidance:Guidance",
         "formation_gnc.guidance.parameters:GuidanceParameters",
         takes=(NAVIGATION_STATE,),
+        takes_of_before=(MODE,),
         takes_of_others=(NAVIGATION_STATE,),
         gives=(topics.TARGET, topics.SEPARATION),
     ),
@@ -111,13 +118,32 @@ for _row in (
         "formation_gnc.control.controller_manager:ControllerManager",
         "formation_gnc.control.controller_manager:ControllerParameters",
         takes=(NAVIGATION_STATE, Input.whole(topics.TARGET)),
+        takes_of_before=(MODE,),
         gives=(topics.THRUST, topics.STATUS),
+    ),
+    Row(
+        "supervisor",
+        "formation_gnc.supervision.supervisor:Supervisor",
+        "formation_gnc.supervision.parameters:SupervisorParameters",
+        takes=(Input.whole(topics.MEASUREMENT),),
+        takes_of_before=tuple(map(Input.whole, (topics.ESTIMATE, topics.TARGET, topics.STATUS, topics.THRUST))),
+        gives=(topics.MODE, topics.HEALTH),
     ),
 ):
     add_module(_row)
 
 COMMAND = topics.THRUST
 """What the plant waits for."""
+
+
+def commanding() -> tuple[Row, ...]:
+    """Rows without whose answer of a tick there is no command, and the tick is missed."""
+    found, wanted = list[Row](), {COMMAND}
+    for row in reversed(GRAPH):
+        if wanted.intersection(row.gives):
+            found.append(row)
+            wanted.update(each.topic for each in row.takes)
+    return tuple(reversed(found))
 
 
 def modules_named(names: Sequence[str]) -> tuple[Row, ...]:
@@ -131,8 +157,10 @@ def modules_named(names: Sequence[str]) -> tuple[Row, ...]:
 class ModuleInstance:
     """A flight module of one deputy: its inputs brought together by stamp, its outputs by topic."""
 
-    def __init__(self, row: Row, deputy: str, parameters: Any) -> None:
+    def __init__(self, row: Row, deputy: str, parameters: Any, without: Collection[str] = ()) -> None:
         """Build the module.
+
+        without: full names of dispensable topics that nobody publishes, and that are not waited for.
 
         Raises:
             ConfigurationError: parameters that cannot be flown.
@@ -140,30 +168,39 @@ class ModuleInstance:
         self.row, self.deputy = row, deputy
         self.node = f"/{deputy}/{row.name}"
         self.module: FlightModule[Any, Any] = row.module(self.node, parameters)
-        others = self.module.neighbours
-        self.inputs = {each.topic.of(deputy): each.record for each in row.takes}
-        """Record by full name of each needed topic."""
-        self.inputs_of_others = {each.topic.of(name): each.record for each in row.takes_of_others for name in others}
-        """The same of the dispensable ones."""
+        needed = {each.topic.of(deputy): each.record for each in row.takes}
+        delayed = {each.topic.of(deputy): each.record for each in row.takes_of_before}
+        others = {each.topic.of(name): each.record for each in row.takes_of_others for name in self.module.neighbours}
+        self.inputs = needed | delayed | others
+        """Record by full name of each topic that it takes."""
+        self.needed = tuple(needed)
+        """Full names of those that it cannot answer without."""
+        self.delayed = frozenset(delayed)
+        """Full names of those of the tick before."""
         self.outputs = tuple(topic.of(deputy) for topic in row.gives)
-        self.synchronizer = StampSynchronizer((*self.inputs, *self.inputs_of_others), len(self.inputs))
+        self.synchronizer = StampSynchronizer(
+            InputTopics(
+                self.needed,
+                tuple(delayed),
+                tuple(others),
+                self.module.parameters.tick_ns,
+                self.module.has_delayed_inputs,
+                frozenset(without),
+            )
+        )
 
     def published(self) -> Iterator[Topic]:
         """The topics that it publishes: those of a fleet only in one."""
         return (topic for topic in self.row.gives if not topic.fleet_only or self.module.neighbours)
 
-    def collect(self, records: Mapping[str, Any]) -> Sequence[Any] | None:
-        """Its inputs at a tick, of the records there are by topic; None while it cannot answer."""
-        if not self.inputs_of_others:
-            try:
-                return [records[topic] for topic in self.inputs]
-            except KeyError:
-                return None
-        inputs: Sequence[Any] | None = None
-        for topic in (*self.inputs_of_others, *reversed(self.inputs)):  # the pacing topic last
-            if topic in records:
-                inputs = self.synchronizer.take(topic, records[topic])
-        return inputs
+    def collect(
+        self, records: Mapping[str, Any], before: Mapping[str, Any], missing: Sequence[int] | None = None
+    ) -> Sequence[Any] | None:
+        """Its inputs at a tick, of the records that there are by topic, and of the tick before; None for no answer.
+
+        missing: places of those that it is known to have answered without.
+        """
+        return self.synchronizer.take_tick(records, before, missing)
 
     def respond(self, inputs: Sequence[Any]) -> list[tuple[str, Any]]:
         """Answer a tick: full topic name and record of each output there is."""
@@ -175,6 +212,11 @@ class ModuleInstance:
     def take_events(self) -> list[Event]:
         """The module's events since they were last taken."""
         return self.module.take_events()
+
+
+def missing(inputs: Sequence[Any]) -> list[int]:
+    """Places of the inputs of a tick that a module does without."""
+    return [place for place, each in enumerate(inputs) if each is None] if None in inputs else []
 
 
 def every_tick(deputy: str) -> list[str]:

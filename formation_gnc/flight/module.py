@@ -39,6 +39,17 @@ class Configuration[P, D]:
     """The scheduled configurations, where `changes` sets the schedule."""
 
 
+@dataclass(frozen=True)
+class Condition:
+    """How something that a module watches is doing, for diagnostics."""
+
+    name: str
+    level: int
+    """0 for well, 1 for a warning, 2 for an error."""
+    message: str
+    values: Mapping[str, Any]
+
+
 type Plan[P, D] = tuple[tuple[int, Configuration[P, D]], ...]
 """Scheduled configurations with the times (ns) from which they hold, in order of time."""
 
@@ -100,9 +111,17 @@ class FlightModule[P: ModuleParameters, D](ABC):
     def check_plan(self, start: Configuration[P, D], plan: Plan[P, D]) -> None:  # noqa: B027 - optional
         """Raise ConfigurationError for scheduled changes that may not follow one another, or `start`."""
 
+    def has_delayed_inputs(self, pacing: Any) -> bool:
+        """Whether its inputs of the tick before are there, or on their way; by the record of its first input."""
+        return True
+
     def first_of(self, waiting: Sequence[Any]) -> Any:
         """Where to go on among inputs that wait: by default with the last, since the others are too late."""
         return waiting[-1]
+
+    def conditions(self) -> Sequence[Condition]:
+        """What it watches besides itself, for diagnostics; called now and then."""
+        return ()
 
     @property
     def waiting_for(self) -> str:

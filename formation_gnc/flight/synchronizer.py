@@ -1,7 +1,8 @@
 """Synchronization of several topics by stamp, never by order of arrival."""
 
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 HISTORY = 64
@@ -15,27 +16,52 @@ class Stamped(Protocol):
     """ns."""
 
 
-class StampSynchronizer:
-    """Collects the records of several topics that have the same stamp.
+@dataclass(frozen=True)
+class InputTopics:
+    """Topics of a module's inputs, in the order in which it takes them; the first one sets the pace."""
 
-    The first topic sets the pace. At each new stamp of it, an optional topic without a record at the previous
-    stamp counts as missing, and is not waited for; one with a record is. So a silent satellite delays the
+    needed: tuple[str, ...]
+    """At least one; always waited for."""
+    delayed: tuple[str, ...] = ()
+    """Optional; of the tick before."""
+    optional: tuple[str, ...] = ()
+    delay: int = 0
+    """Time of a tick, ns; of the delayed ones."""
+    has_delayed: Callable[[Any], bool] = lambda _: True
+    """Whether there are delayed ones, by the pacing topic's record."""
+    without: frozenset[str] = frozenset()
+    """Delayed and optional topics that are always missing."""
+
+
+class StampSynchronizer:
+    """Collects the records of several topics that have the same stamp, delayed ones with that of the tick before.
+
+    The first topic sets the pace. At each new stamp of it, an optional topic without a record where the previous
+    one needed it counts as missing, and is not waited for; one with a record is. So a silent satellite delays the
     others by one tick, and is waited for again from the tick after it resumed, in whatever order records
-    arrive. The first `needed` topics are always waited for. A pacing stamp that runs backwards starts a new
-    run, with nothing missing.
+    arrive. A pacing stamp that runs backwards starts a new run, with nothing missing. Before the first tick,
+    at 0, there is nothing, and nothing to wait for.
+
+    Records are given one by one as they arrive (`take`), or all of a tick at once (`take_tick`).
     """
 
-    def __init__(self, topics: Sequence[str], needed: int) -> None:
-        """Synchronize these topics, of which the first `needed` (at least one) are required."""
-        self._received = {topic: OrderedDict[int, Stamped]() for topic in topics}
-        self._pacing, self._optional = topics[0], tuple(topics[needed:])
-        self._missing: frozenset[str] = frozenset()
+    def __init__(self, topics: InputTopics) -> None:
+        """Synchronize these topics."""
+        self._topics, self._pacing = topics, topics.needed[0]
+        every = (*topics.needed, *topics.delayed, *topics.optional)
+        self._received = {topic: OrderedDict[int, Stamped]() for topic in every}
+        self._missing = _NONE
+        """Topics that are not waited for at the current stamp."""
+        self._awaited: tuple[str, ...] = ()
+        """Optional topics that have a record of the current tick where they do not miss it."""
+        self._absent = _NONE
+        """Those of them that have none."""
         self._current: int | None = None
         """Latest stamp of the pacing topic, ns."""
         self._completed: int | None = None
         """Latest stamp at which all records were returned, ns."""
 
-    def take(self, topic: str, record: Stamped) -> list[Any] | None:
+    def take(self, topic: str, record: Stamped) -> Sequence[Any] | None:
         """Add a record; once per stamp returns the records of all topics, each of its topic's own type.
 
         A stamp before 0 is of no run, and ignored.
@@ -49,33 +75,93 @@ class StampSynchronizer:
         if received and time < _latest(received):
             received.clear()
         if topic == self._pacing and time != self._current:
-            self._advance(time)
+            if self._current is not None and time < self._current:
+                self._clear_after(time)
+            elif self._current is not None:
+                self._absent = frozenset(each for each in self._awaited if self._of(each, self._current) is None)
+            self._advance(record)
         received[time] = record
         if len(received) > HISTORY:
             received.popitem(last=False)
         current = self._current
         if current is None or current == self._completed:
             return None
-        records = [None if each in self._missing else of.get(current) for each, of in self._received.items()]
+        records = [None if each in self._missing else self._of(each, current) for each in self._received]
         if records.count(None) > len(self._missing):
             return None
         self._completed = current
         return records
 
-    def _advance(self, time: int) -> None:
-        """Go to a new stamp (ns) of the pacing topic."""
-        previous, self._current = self._current, time
-        if previous is not None and time < previous:
-            self._restart(time)
-        elif self._optional and previous is not None:
-            self._missing = frozenset(each for each in self._optional if previous not in self._received[each])
+    def take_tick(
+        self, records: Mapping[str, Any], before: Mapping[str, Any], missing: Sequence[int] | None = None
+    ) -> Sequence[Any] | None:
+        """As `take` of all records of a tick, by topic, with those of the tick before: what is not there is not late.
 
-    def _restart(self, time: int) -> None:
-        """Start a new run at a stamp (ns), without the records that topics have left from the previous run."""
-        self._missing, self._completed = frozenset(), None
+        missing: places of the topics that were missing, where the tick is known to have been answered without.
+
+        Returns:
+            As `take`; None when the tick cannot be answered.
+        """
+        topics, pacing = self._topics, records.get(self._pacing)
+        if pacing is None or pacing.time == self._current:
+            return None
+        self._advance(pacing)
+        if missing is not None:
+            names = tuple(self._received)
+            self._missing = frozenset(names[place] for place in missing if place < len(names))
+        try:
+            inputs = [records[topic] for topic in topics.needed]
+            if topics.delayed:
+                inputs += [before[topic] for topic in topics.delayed]
+            if topics.optional:
+                inputs += [records[topic] for topic in topics.optional]
+        except KeyError:
+            sources = dict.fromkeys(topics.delayed, before)
+            inputs = [sources.get(topic, records).get(topic) for topic in self._received]
+            there = [topic for topic, each in zip(self._received, inputs, strict=True) if each is not None]
+            self._absent = frozenset(self._awaited).difference(there)
+            if not self._missing.issuperset(self._received.keys() - there):
+                return None
+        if self._missing:
+            return [
+                None if topic in self._missing else each for topic, each in zip(self._received, inputs, strict=True)
+            ]
+        return inputs
+
+    @property
+    def unanswered(self) -> Any | None:
+        """The pacing record of the current stamp while others are awaited; None for none."""
+        current = self._current
+        return None if current is None or current == self._completed else self._received[self._pacing].get(current)
+
+    def _of(self, topic: str, time: int) -> Stamped | None:
+        """The record of a topic for a pacing stamp (ns)."""
+        return self._received[topic].get(time - self._topics.delay if topic in self._topics.delayed else time)
+
+    def _advance(self, pacing: Stamped) -> None:
+        """Go to the stamp of a record of the pacing topic."""
+        topics, time = self._topics, pacing.time
+        if self._current is not None and time < self._current:
+            self._absent, self._completed = _NONE, None
+        self._current = time
+        self._missing, self._absent = self._absent, _NONE
+        self._awaited = topics.optional
+        if topics.delayed:
+            if time >= topics.delay and topics.has_delayed(pacing):
+                self._awaited += topics.delayed
+            else:
+                self._missing |= frozenset(topics.delayed)
+        if topics.without:
+            self._missing |= topics.without
+
+    def _clear_after(self, time: int) -> None:
+        """Drop the records that topics have left from a run that had come further than a time (ns)."""
         for received in self._received.values():
             if received and _latest(received) > time:
                 received.clear()
+
+
+_NONE: frozenset[str] = frozenset()
 
 
 def _latest(received: OrderedDict[int, Stamped]) -> int:

@@ -6,7 +6,7 @@ Names without a leading slash are in a deputy's namespace: `estimate` of `deputy
 from dataclasses import dataclass
 from typing import Any
 
-from formation_gnc import records
+from formation_gnc import mode_records, records
 
 QUEUE_DEPTH = 500
 """Messages that a writer keeps for who is late or slow, and that the recorder may lag behind.
@@ -45,7 +45,8 @@ EVENTS = Topic(
     "/events",
     records.Event,
     "when something happens",
-    "changes of parameters, hand-overs, fallbacks, rejections, misses, the end of the run, each with its tick",
+    "changes of parameters and mode, hand-overs, fallbacks, rejections, misses, faults injected, detected and "
+    "answered, the end of the run, each with its tick",
     every_tick=False,
 )
 DIAGNOSTICS = Topic(
@@ -119,6 +120,19 @@ THRUST = Topic(
     "thrust", records.Thrust, "answers each estimate with its target", "force from the stamp to the next tick"
 )
 STATUS = Topic("status", records.Status, "with each thrust", "law in use, demand before the limit, solver, fallback")
+MODE = Topic(
+    "mode",
+    mode_records.ModeState,
+    "every tick",
+    "mode from the next tick on, sensors, axes and laws that modules do without, force in modes that evade",
+)
+HEALTH = Topic(
+    "health",
+    mode_records.HealthReport,
+    "when it changes",
+    "verdicts of the monitors that are not well, of the tick before",
+    every_tick=False,
+)
 TIMING = Topic(
     "timing",
     records.Timing,
@@ -127,7 +141,7 @@ TIMING = Topic(
 )
 
 RUN_TOPICS = (CLOCK, TRUTH, EVENTS, DIAGNOSTICS, PROGRESS, MARKERS, TF, TRANSFORMS)
-DEPUTY_TOPICS = (MEASUREMENT, ESTIMATE, TARGET, SEPARATION, THRUST, STATUS, TIMING)
+DEPUTY_TOPICS = (MEASUREMENT, ESTIMATE, TARGET, SEPARATION, THRUST, STATUS, MODE, HEALTH, TIMING)
 
 
 def deputy_of(name: str) -> str:

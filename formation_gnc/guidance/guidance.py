@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from formation_gnc.errors import ConfigurationError, ParameterError
+from formation_gnc.flight.mode import ModeInForce
 from formation_gnc.flight.module import FlightModule
 from formation_gnc.guidance.eclipse_forecast import EclipseForecast
 from formation_gnc.guidance.parameters import GuidanceParameters
@@ -22,15 +23,9 @@ from formation_gnc.guidance.reconfiguration import (
 from formation_gnc.guidance.separation import SeparationMonitor, describe, least_from_track, predict
 from formation_gnc.guidance.slots import MAX_RANGE, SlotAssigner, check_assignment, design_path
 from formation_gnc.guidance.targets import TargetPath
+from formation_gnc.mode_records import Mode, ModeState
 from formation_gnc.parameters import to_json
-from formation_gnc.records import (
-    NO_NEIGHBOURS,
-    EventKind,
-    NavigationState,
-    ParameterChange,
-    Separation,
-    Target,
-)
+from formation_gnc.records import NO_NEIGHBOURS, EventKind, NavigationState, ParameterChange, Separation, Target
 from formation_gnc.types import NANOSECONDS, Vector
 
 MODEL_ERROR = 0.05
@@ -39,6 +34,10 @@ MODEL_ERROR = 0.05
 OCCUPIED = 0.05
 """Least distance, and rate times a radian, within which a neighbour occupies a slot, as a share of the
 formation's size: above control errors, below the distance between slots."""
+
+
+FIRM = frozenset({Mode.AVOID, Mode.SAFE})
+"""Modes in which the target stays."""
 
 
 class Guidance(FlightModule[GuidanceParameters, TargetPath]):
@@ -81,16 +80,19 @@ class Guidance(FlightModule[GuidanceParameters, TargetPath]):
         self._separations = SeparationMonitor()
         self._new_target: NewTarget | None = NewTarget()
         self._neighbour_states: Mapping[str, NavigationState] = {}
+        self._mode = ModeInForce()
 
     def on_tick(
-        self, estimate: NavigationState, *neighbours: NavigationState | None
+        self, estimate: NavigationState, mode: ModeState | None = None, *neighbours: NavigationState | None
     ) -> tuple[Target, Separation | None]:
         """The target at the estimate's stamp, and the predicted separation when one is due.
 
         Args:
             estimate: of this deputy.
+            mode: of the tick before; None for the one that stands.
             neighbours: estimates of `self.neighbours` at the same stamp; None for one that is missing.
         """
+        self._mode.take(mode)
         self.begin_tick(estimate.time)
         if neighbours:
             self._neighbour_states = {
@@ -117,13 +119,17 @@ class Guidance(FlightModule[GuidanceParameters, TargetPath]):
             np.array([each.relative_state for each in self._neighbour_states.values()])
             if self._neighbour_states
             else NO_NEIGHBOURS,
+            self._lock.is_closed(estimate.time),
         )
-        return target, self._predict_separation(estimate, target) if neighbours else None
+        separation = self._predict_separation(estimate, target) if neighbours else None
+        if separation is not None:
+            target.separation = [separation]
+        return target, separation
 
     def check_staged(self, staged: GuidanceConfiguration) -> None:
-        """Reject a new target while a reconfiguration is under way, for one deputy alone where slots are assigned
-        over the fleet, and in an occupied slot."""
-        self._lock.check(self.time, staged.changes)
+        """Reject a new target while a reconfiguration is under way or the mode evades, for one deputy alone where
+        slots are assigned over the fleet, and in an occupied slot."""
+        self.check_due(self.time, staged)
         if self.parameters.assignment != "fixed" and not leaves_target(staged.changes):
             raise ConfigurationError(
                 f"assignment is {self.parameters.assignment}: the whole fleet changes at one tick, and so by "
@@ -132,8 +138,10 @@ class Guidance(FlightModule[GuidanceParameters, TargetPath]):
         self._check_unoccupied(staged)
 
     def check_due(self, time: int, due: GuidanceConfiguration) -> None:
-        """Reject a new target while a reconfiguration is under way."""
+        """Reject a new target while a reconfiguration is under way, or the mode evades."""
         self._lock.check(time, due.changes)
+        if self._mode.name in FIRM and not leaves_target(due.changes):
+            raise ConfigurationError(f"mode is {self._mode.name}: the target stays; command another mode first")
 
     def check_plan(self, start: GuidanceConfiguration, plan: GuidancePlan) -> None:
         """Reject a scheduled change of target within the time of the previous one."""

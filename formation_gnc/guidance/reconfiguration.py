@@ -40,9 +40,13 @@ class ReconfigurationLock:
         """Lock the target from a time (ns) for a duration (s)."""
         self._until = _end(time, duration)
 
+    def is_closed(self, time: int) -> bool:
+        """Whether the target is locked at a time, ns."""
+        return time < self._until
+
     def check(self, time: int, changes: Mapping[str, Any]) -> None:
         """Raise ConfigurationError for changes of the target at a time (ns) when it is locked."""
-        if time < self._until and not leaves_target(changes):
+        if self.is_closed(time) and not leaves_target(changes):
             raise ConfigurationError(_locked(self._until))
 
     def check_plan(self, start: GuidanceConfiguration, plan: GuidancePlan) -> None:

@@ -66,6 +66,8 @@ class Consistency:
                 return Verdict.CONSISTENT, 1.0
             self._inflations += 1
             return (Verdict.GIVE_UP if self._inflations > INFLATIONS else Verdict.INFLATE), INFLATION
+        if not used:  # all were compared only
+            return Verdict.CONSISTENT, 1.0
         self._rejected = self._inflations = 0
         self._nis.append(nis)
         self._freedom.append(used)

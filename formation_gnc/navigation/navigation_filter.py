@@ -1,11 +1,14 @@
 """Relative navigation of one deputy, from measurement to estimate."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from enum import Enum
 
 import numpy as np
 
+from formation_gnc.flight.mode import ModeInForce
 from formation_gnc.flight.module import Configuration, FlightModule
+from formation_gnc.mode_records import ModeState, RestrictionKind
 from formation_gnc.navigation.adaptive_noise import AdaptiveNoise
 from formation_gnc.navigation.consistency import UPDATES_TO_DIVERGE, Verdict
 from formation_gnc.navigation.filter_state import Design, FilterState, acquire, expected_observability
@@ -58,6 +61,12 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         self._rejections = Rejections()
         super().__init__(name, parameters)
 
+    def reset(self) -> None:
+        """No mode has been said; the state waits for a fix to end."""
+        self._mode = ModeInForce()
+        self._isolated: tuple[str, ...] = ()
+        """Sensors that are left out by restriction."""
+
     def design(self, parameters: NavigationParameters) -> Design:
         """Process model, constants of a tick, variances."""
         load(parameters.filter)
@@ -88,11 +97,39 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         if new.design.variance != old.design.variance or (
             parameters.observability_window != old.parameters.observability_window
         ):
-            state.observability = expected_observability(state.chief.state, state.filter.state, parameters, new.design)
-            self._report_observability(state)
+            self._begin_observability(state)
 
-    def on_tick(self, measurement: Measurement) -> Estimate | None:
-        """Estimate at the measurement's stamp; none for a measurement that is ignored, and without a state."""
+    @property
+    def _design(self) -> Design:
+        """The design, without the sensors that are isolated."""
+        design = self.configuration.design
+        if not self._isolated:
+            return design
+        return replace(design, variance=self._left(self._isolated))
+
+    def _left(self, isolated: Sequence[str]) -> dict[str, tuple[float, ...]]:
+        """Variances of the sensors in use besides the isolated ones."""
+        return {name: each for name, each in self.configuration.design.variance.items() if name not in isolated}
+
+    def _obey(self) -> None:
+        """Leave out the sensors that the mode says, or take them up again; none where no other would be left."""
+        isolated = self._mode.without(RestrictionKind.SENSOR)
+        if not self._left(isolated):
+            isolated = ()
+        if isolated == self._isolated:
+            return
+        self._isolated = isolated
+        if self._state is not None:
+            self._state.noise = AdaptiveNoise()
+            self._begin_observability(self._state)
+
+    def on_tick(self, measurement: Measurement, mode: ModeState | None = None) -> Estimate | None:
+        """Estimate at the measurement's stamp; none for a measurement that is ignored, and without a state.
+
+        mode: of the tick before; None for the one that stands.
+        """
+        if self._mode.take(mode):
+            self._obey()
         action = self._action(measurement)
         if action is _Action.IGNORE:
             return None
@@ -119,7 +156,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
 
     def _warn_of_sensors(self, state: FilterState, time: int) -> None:
         """Log sensors that are noisier than their parameters, or silent."""
-        design = self.configuration.design
+        design = self._design
         silences = state.checks.take_silences(design.variance, state.start, time, design.silent_after)
         for subject, detail in state.noise.take_reports() + silences:
             self.log(time, EventKind.WARNING, detail, subject)
@@ -168,10 +205,17 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
 
     def _acquire(self, measurement: Measurement) -> FilterState:
         self._said_that_it_waits = False
-        self._state = acquire(measurement, self.parameters, self.configuration.design, self._rejections)
+        self._state = acquire(measurement, self.parameters, self._design, self._rejections)
         self.log(measurement.time, EventKind.ACQUIRED, "filter started from an acquisition fix")
         self._report_observability(self._state)
         return self._state
+
+    def _begin_observability(self, state: FilterState) -> None:
+        """Begin a new window with the sensors in use."""
+        state.observability = expected_observability(
+            state.chief.state, state.filter.state, self.parameters, self._design
+        )
+        self._report_observability(state)
 
     def _report_observability(self, state: FilterState) -> None:
         words = state.observability.words
@@ -233,7 +277,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         """Update with the readings, and check consistency; none when the state is lost."""
         result = self._update(state, measurement)
         if result is not None:
-            rejected = [each.sensor for each in result.innovations if each.rejection]
+            rejected = [each.sensor for each in result.innovations if each.rejection == Rejection.GATE]
             verdict, factor = state.consistency.judge(
                 result.nis,
                 result.used,
@@ -288,7 +332,8 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         )
         if readings is None:
             return None
-        return update(state, readings, design.gate, parameters.pseudo_measurements, self._rejections)
+        pseudo = parameters.pseudo_measurements
+        return update(state, readings, design.gate, pseudo, self._rejections, self._isolated)
 
     def _lose(self, time: int, reason: str) -> None:
         """Lose the state: without an estimate the tick is missed, and the next measurement has a fix."""

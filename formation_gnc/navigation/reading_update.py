@@ -1,5 +1,6 @@
 """Update of the filter with the readings of a tick, behind a gate on each reading."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from math import isfinite, sqrt
 
@@ -19,7 +20,7 @@ class UpdateResult:
     """Outcome of an update."""
 
     innovations: list[Innovation]
-    """Of the readings used and of those beyond the gate, in the order of the readings."""
+    """Of the readings used, beyond the gate and isolated, in the order of the readings."""
     nis: float
     used: int
     """Number of values used."""
@@ -40,8 +41,15 @@ class _Linearized:
     """(m, 6)."""
 
 
-def update(state: FilterState, readings: Readings, gate: float, pseudo: bool, rejections: Rejections) -> UpdateResult:
-    """Update the filter with the readings within the gate.
+def update(
+    state: FilterState,
+    readings: Readings,
+    gate: float,
+    pseudo: bool,
+    rejections: Rejections,
+    isolated: Collection[str] = (),
+) -> UpdateResult:
+    """Update the filter with the readings within the gate, but for those of isolated sensors.
 
     Args:
         state: of the filter, updated.
@@ -49,12 +57,17 @@ def update(state: FilterState, readings: Readings, gate: float, pseudo: bool, re
         gate: largest accepted innovation squared over its variance.
         pseudo: whether to use pseudo-measurements when there is a fresh reading of each of their sensors.
         rejections: counts, added to.
+        isolated: sensors whose readings are compared with the state, and not used.
 
     Raises:
         ArithmeticError: the result is not finite.
     """
-    within, innovations = _gated(state, readings, gate, rejections)
-    offered = readings.model.size
+    within, innovations = _gated(state, readings, gate, rejections, isolated)
+    offered = sum(
+        rows.stop - rows.start
+        for name, rows in zip(readings.model.sensors, readings.model.rows, strict=True)
+        if name not in isolated
+    )
     if within is None:
         return UpdateResult(innovations, 0.0, 0, offered)
     readings = within.readings
@@ -72,15 +85,18 @@ def update(state: FilterState, readings: Readings, gate: float, pseudo: bool, re
 
 @np.errstate(all="ignore")  # a reading may be as large as a float
 def _gated(
-    state: FilterState, readings: Readings, gate: float, rejections: Rejections
+    state: FilterState, readings: Readings, gate: float, rejections: Rejections, isolated: Collection[str]
 ) -> tuple[_Linearized | None, list[Innovation]]:
-    """The readings within the gate, linearised, and the innovations of all readings if some are beyond."""
+    """The readings to be used, linearised, and the innovations of all readings if some are not."""
     offered = _Linearized(readings, *state.filter.linearize(readings))
     values = zip(offered.innovation.tolist(), offered.variance.tolist(), strict=True)
     within = [value * value <= gate * variance for value, variance in values]  # false for NaN
-    if all(within):
+    if not isolated and all(within):
         return offered, []
-    passed = [all(within[rows]) for rows in readings.model.rows]
+    names = readings.model.sensors
+    passed = [all(within[rows]) and name not in isolated for name, rows in zip(names, readings.model.rows, strict=True)]
+    if all(passed):
+        return offered, []
     ratios = np.abs(offered.innovation) / np.sqrt(offered.variance)
     innovations = []
     for innovation, rows, passes in zip(_innovations(offered, gate), readings.model.rows, passed, strict=True):
@@ -88,7 +104,9 @@ def _gated(
         if not passes and not isfinite(ratio):
             rejections.add(Rejection.NO_DIRECTION, innovation.sensor)
             continue
-        if not passes:
+        if innovation.sensor in isolated:
+            innovation.rejection = Rejection.ISOLATED
+        elif not passes:
             rejections.add(Rejection.GATE, innovation.sensor, f"{ratio:.1f} standard deviations off")
             innovation.rejection = Rejection.GATE
             noise, total = readings.variance[rows].tolist(), offered.variance[rows].tolist()

@@ -15,9 +15,11 @@ class Satellite:
     """The modules of a deputy."""
 
     def __init__(self) -> None:
-        """Make the nodes in the table's order: who publishes before who subscribes."""
+        """Make the nodes in the table's order; all of them before any subscribes to another."""
         bus = IntraProcessBus()
         self.nodes = [ModuleNode(row, bus) for row in GRAPH]
+        for node in self.nodes:
+            node.subscribe_inputs()
 
     def spin(self) -> None:
         """Work until asked to stop."""

@@ -12,6 +12,7 @@ LAYOUT = "foxglove_layout.json"
 
 AXES = ("x radial", "y along-track", "z cross-track")
 STATES = (
+    (topics.MODE, "mode"),
     (topics.STATUS, "algorithm"),
     (topics.STATUS, "fallback"),
     (topics.ESTIMATE, "status"),
@@ -75,7 +76,7 @@ def _deputy_tab(panels: _Panels, name: str) -> Any:
     states = panels.add(
         "StateTransitions",
         f"{name}-states",
-        foxglovePanelTitle="Law, filter and shadow",
+        foxglovePanelTitle="Mode, law, filter and shadow",
         isSynced=True,
         paths=[
             {

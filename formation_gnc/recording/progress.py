@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from formation_gnc.flight import topics
-from formation_gnc.flight.graph import GRAPH
+from formation_gnc.flight.graph import GRAPH, commanding
 from formation_gnc.recording.parameter_collection import PLANT
 from formation_gnc.records import Event, EventKind
 
@@ -21,6 +21,7 @@ class RecordingProgress:
     def __init__(self) -> None:
         """Start with nothing recorded."""
         self._answer_names = tuple(row.answer.name for row in GRAPH)
+        self._commanding = frozenset(row.answer.name for row in commanding())
         self.reset()
 
     def reset(self) -> None:
@@ -65,9 +66,18 @@ class RecordingProgress:
         for topic in self._plant:
             deputy = topics.deputy_of(topic)
             if deputy:
-                stamps.add(max(min(self._answers_of(deputy).values()), self._missed.get(deputy, NONE)))
+                stamps.add(self._recorded_of(deputy))
         recorded = min(stamps, default=NONE)
         return self._end if len(stamps) == 1 and self._end > recorded else recorded
+
+    def _recorded_of(self, deputy: str) -> int:
+        """Stamp (ns) up to which a deputy has answered or missed.
+
+        A module that the plant does not wait for may fall silent: it counts no more once a tick was missed since.
+        """
+        missed = self._missed.get(deputy, NONE)
+        answers = self._answers_of(deputy).items()
+        return max(min(stamp for name, stamp in answers if name in self._commanding or stamp >= missed), missed)
 
     def _answers_of(self, deputy: str) -> dict[str, int]:
         return self._answers.setdefault(deputy, dict.fromkeys(self._answer_names, NONE))

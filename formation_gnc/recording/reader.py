@@ -274,7 +274,7 @@ class Bag:
         found: dict[str, set[int]] = {topic: set() for topic in topics}
         latest: dict[str, int] = {}
         for message in self._messages([topic for topic in topics if topic in self.topics]):
-            if message.sequence == 1 and latest.get(message.topic, 1) != 1:
+            if message.sequence == 1 and message.topic in latest:
                 found[message.topic].add(message.stamp)
             latest[message.topic] = message.sequence
         return found

@@ -10,14 +10,14 @@ The truth is recorded, not flown: changed modules say what they would have comma
 """
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
-from formation_gnc.flight.graph import MODULES, ModuleInstance, Row, modules_named
+from formation_gnc.flight.graph import MODULES, ModuleInstance, Row, missing, modules_named
 from formation_gnc.parameters import OWN_OF_ROS, load
 from formation_gnc.recording.provenance import parameters_record
 from formation_gnc.recording.reader import Bag
@@ -35,10 +35,14 @@ Copy = Callable[[str, bytes, int], None]
 class ReplayedModule:
     """One module, run again; started again where it had been in the recorded run."""
 
-    def __init__(self, node: str, values: Mapping[str, Any]) -> None:
-        """Build it from its parameters; raises ConfigurationError for what cannot be flown."""
+    def __init__(self, node: str, values: Mapping[str, Any], without: Collection[str] = ()) -> None:
+        """Build it from its parameters; raises ConfigurationError for what cannot be flown.
+
+        without: full names of dispensable topics that neither the bag nor the replay has.
+        """
+        self.without = without
         self.node, self.deputy = node, topics.deputy_of(node)
-        self.row: Row = MODULES[node.rpartition("/")[2]]
+        self.row: Row = MODULES[_name(node)]
         self.restarts: dict[int, Any] = {}
         """Parameters by the stamps of the first answers of processes that had been started again."""
         self.answer, self.timing = self.row.answer.of(self.deputy), topics.TIMING.of(self.deputy)
@@ -50,7 +54,7 @@ class ReplayedModule:
     def start(self, parameters: Any) -> None:
         """Start as a process with these parameters does."""
         self.parameters = parameters
-        self.instance = ModuleInstance(self.row, self.deputy, parameters)
+        self.instance = ModuleInstance(self.row, self.deputy, parameters, self.without)
 
     def is_given_input(self, stamp: int, was_given: bool, recorded: Any) -> bool:
         """Whether it gets a tick's input; starts it again where it had been.
@@ -100,6 +104,12 @@ def nodes_of(bag: Bag, modules: Sequence[str]) -> list[str]:
     return [f"/{deputy}/{row.name}" for row in rows for deputy in deputies]
 
 
+def has_flown(bag: Bag, node: str) -> bool:
+    """Whether a bag has any output of a node."""
+    outputs = (topic.of(topics.deputy_of(node)) for topic in MODULES[_name(node)].gives)
+    return any(topic in bag.topics and bag.topics[topic].count for topic in outputs)
+
+
 def replay(bag: Bag, parameters: Mapping[str, Mapping[str, Any]], decode: Decode, sink: Sink, copy: Copy) -> list[str]:
     """Run a bag's inputs through modules again, tick by tick.
 
@@ -118,11 +128,15 @@ def replay(bag: Bag, parameters: Mapping[str, Mapping[str, Any]], decode: Decode
         ConfigurationError: parameters that cannot be flown, or a recorded change that these do not allow.
     """
     modules = []
+    given = {name for name, topic in bag.topics.items() if topic.count}
+    given |= {topic.of(topics.deputy_of(node)) for node in parameters for topic in MODULES[_name(node)].gives}
     for node, values in parameters.items():
+        row, deputy = MODULES[_name(node)], topics.deputy_of(node)
+        without = {each.topic.of(deputy) for each in row.takes_of_before} - given
         if not values:
             raise ConfigurationError(f"{bag.path}: has no parameters of {node}; give them in a file")
         try:
-            modules.append(ReplayedModule(node, values))
+            modules.append(ReplayedModule(node, values, without))
         except ConfigurationError as error:
             raise ConfigurationError(f"{node}: {error}") from None
     remarks = list(_note_restarts(bag, modules, parameters))
@@ -162,8 +176,8 @@ class _RecordedTick:
     messages: dict[str, list[bytes]] = field(default_factory=dict)
     swaps: dict[str, list[Event]] = field(default_factory=dict)
     """Changes of parameters by node."""
-    timed: set[str] = field(default_factory=set)
-    """Nodes that finished the tick."""
+    timed: dict[str, list[int]] = field(default_factory=dict)
+    """Nodes that finished the tick, each with the places of the inputs that it had to do without."""
 
 
 class _Replay:
@@ -171,6 +185,8 @@ class _Replay:
         self._bag, self._modules, self._decode, self._sink, self._copy = bag, modules, decode, sink, copy
         self._nodes = {module.node for module in modules}
         self._outputs = {topic for module in modules for topic in module.instance.outputs}
+        self._before: tuple[_RecordedTick, dict[str, Any]] = (_RecordedTick(-1), {})
+        """The tick before, and what was replayed of it, by topic."""
         self._timings = {name for name, topic in bag.topics.items() if topic.count and _is_timing(name)}
 
     def run(self) -> None:
@@ -194,6 +210,7 @@ class _Replay:
         for module in self._modules:
             if topics.MEASUREMENT.of(module.deputy) in tick.messages:
                 self._replay_module(tick, module, records)
+        self._before = tick, records
 
     def _is_replaced(self, tick: _RecordedTick, topic: str, data: bytes) -> bool:
         """Whether the replay publishes this message's like; notes swaps and finished ticks on the way."""
@@ -207,7 +224,7 @@ class _Replay:
         if _is_timing(topic):
             timing = self._decode(topic, data)
             node = f"/{topics.deputy_of(topic)}/{timing.node if timing else ''}"
-            tick.timed.add(node)
+            tick.timed[node] = timing.missing if timing else []
             return node in self._nodes
         return topic in self._outputs
 
@@ -232,18 +249,24 @@ class _Replay:
                 self._sink(topic, record)
         if is_timed:
             spent = round((perf_counter() - started) * NANOSECONDS)
-            self._sink(module.timing, Timing(tick.stamp, module.row.name, spent))
+            self._sink(module.timing, Timing(tick.stamp, module.row.name, spent, missing(inputs)))
         for event in events:
             self._sink(topics.EVENTS.name, event)
 
     def _inputs(self, tick: _RecordedTick, module: ReplayedModule, records: Mapping[str, Any]) -> Sequence[Any] | None:
         """A module's inputs: as replayed where they are outputs of the replay, else as recorded."""
-        there = {}
-        for topic in (*module.instance.inputs, *module.instance.inputs_of_others):
-            record = records.get(topic) if topic in self._outputs else self._recorded(tick, topic)
-            if record is not None:
-                there[topic] = record
-        return module.instance.collect(there)
+        instance, (earlier, replayed) = module.instance, self._before
+        follows = earlier.stamp == tick.stamp - instance.module.parameters.tick_ns
+        before = self._those(instance.delayed, earlier, replayed) if follows else {}
+        now = self._those(instance.inputs.keys() - instance.delayed, tick, records)
+        return instance.collect(now, before, tick.timed.get(module.node))
+
+    def _those(self, names: Collection[str], tick: _RecordedTick, replayed: Mapping[str, Any]) -> dict[str, Any]:
+        """The records of topics at a tick, of those that have one."""
+        records = {
+            topic: replayed.get(topic) if topic in self._outputs else self._recorded(tick, topic) for topic in names
+        }
+        return {topic: record for topic, record in records.items() if record is not None}
 
     def _take_recorded(self, tick: _RecordedTick, module: ReplayedModule, records: dict[str, Any]) -> None:
         """Copy an answer to what the bag lacks: a killed node may have reached others with it."""
@@ -258,6 +281,11 @@ class _Replay:
     def _recorded(self, tick: _RecordedTick, topic: str) -> Any:
         messages = tick.messages.get(topic)
         return self._decode(topic, messages[-1]) if messages else None
+
+
+def _name(node: str) -> str:
+    """Name of a node's module in the graph table."""
+    return node.rpartition("/")[2]
 
 
 def _is_timing(topic: str) -> bool:

@@ -22,6 +22,8 @@ class Run:
         )
         self.instances = {instance.node: instance for instance in instances}
         """By full node name, in the order in which they answer."""
+        self._before: dict[str, Any] = {}
+        """Records of the tick before, by topic."""
         self._commands = {deputy: COMMAND.of(deputy) for deputy in scenario.plant.deputies}
 
     @property
@@ -39,14 +41,14 @@ class Run:
 
         self.simulation.open_tick(0.0, publish)
         for instance in self.instances.values():
-            inputs = instance.collect(records)
+            inputs = instance.collect(records, self._before)
             if inputs is not None:
                 for topic, record in instance.respond(inputs):
-                    records[topic] = record
-                    sink(topic, record)
+                    publish(topic, record)
             if instance.module.events:
                 for event in instance.take_events():
                     sink(topics.EVENTS.name, event)
+        self._before = records
         for deputy, topic in self._commands.items():
             if topic in records:
                 self.simulation.answer(deputy, records[topic])

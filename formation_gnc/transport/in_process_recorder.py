@@ -37,6 +37,10 @@ class InProcessRecorder:
         self._bag.write(topic, data, time, number)
 
 
+_RECORDS = {type_name(each.record): each.record for each in (*topics.RUN_TOPICS, *topics.DEPUTY_TOPICS) if each.record}
+"""Records of topics by type of message."""
+
+
 def reader(bag: Bag) -> Callable[[str, bytes], Any]:
     """A function that gives the record which a message of the bag carries, by its topic and CDR bytes.
 
@@ -51,7 +55,7 @@ def reader(bag: Bag) -> Callable[[str, bytes], Any]:
         if decode is None:
             bag.check_type(topic)
             kind = bag.topics[topic].type_name
-            record = getattr(records, kind.rpartition("/")[2], None)
+            record = _RECORDS.get(kind) or getattr(records, kind.rpartition("/")[2], None)
             if record is None:
                 raise ConfigurationError(f"{bag.path}: topic {topic} has messages of type {kind}")
             decode = known[topic] = received(record)

@@ -20,7 +20,7 @@ from formation_gnc.sil.report import Report
 from formation_gnc.sil.scenario import Scenario
 from formation_gnc.transport.diagnostics import subscribe_to_reports
 from formation_gnc.transport.leftovers import folder_prefix, sweep
-from formation_gnc.transport.processes import Graph, NodeDied, NodeProcess
+from formation_gnc.transport.processes import RESPAWNS, Graph, NodeDied, NodeProcess
 
 LAST_REPORT = 1.0
 """Wall time (s) after the plant's end in which its last report is awaited."""
@@ -34,12 +34,13 @@ class LaunchOptions:
     """How a scenario is flown.
 
     bag: directory to record to; None for no recorder. composed: one process for each satellite, not one for
-    each of its modules. display: start the display node too.
+    each of its modules. display: start the display node too. respawn: start a deputy's node again when it has died.
     """
 
     bag: Path | None = None
     composed: bool = False
     display: bool = False
+    respawn: bool = False
 
 
 @contextmanager
@@ -94,7 +95,7 @@ def fly_graph(
         scenario: what to fly.
         options: how.
         show: called with the run's reports.
-        announce: called once with a line that names the ROS domain of the graph.
+        announce: called with a line that names the ROS domain of the graph, and with one for each node started again.
 
     Returns:
         The last report of the plant.
@@ -123,6 +124,8 @@ def fly_graph(
                 while plant.process.poll() is None:
                     listen(LISTEN)
                     raise_if_interrupted()
+                    for line in graph.respawn():
+                        announce(line)
                     graph.check()
                 graph.check()
                 end = monotonic() + LAST_REPORT
@@ -147,7 +150,7 @@ def _start(graph: Graph, scenario: Scenario, options: LaunchOptions, directory: 
     plant = graph.start(PLANT, arguments)
     for deputy in scenario.plant.deputies:
         for process in ("satellite",) if options.composed else MODULES:
-            graph.start(f"/{deputy}/{process}", arguments)
+            graph.start(f"/{deputy}/{process}", arguments, RESPAWNS if options.respawn else 0)
     if options.display:
         graph.start("/display", arguments)
     return plant

@@ -11,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.service import Service
 
 from formation_gnc.flight import topics
-from formation_gnc.flight.graph import ModuleInstance, Row
+from formation_gnc.flight.graph import ModuleInstance, Row, missing
 from formation_gnc.flight.reception import Information, figures
 from formation_gnc.parameters import dump
 from formation_gnc.records import WARNINGS, EventKind, Timing
@@ -21,7 +21,7 @@ from formation_gnc.transport.node import ConfiguredNode, rejected
 from formation_gnc.types import NANOSECONDS
 
 SETTLING = 0.1
-"""Wall time (s) for which a node that finds messages from before its start waits for more of them."""
+"""Wall time (s) without another one after which a node that finds messages from before its start has all of them."""
 
 SOON = 1_000_000
 """The same (ns) for a node that has been busy: what has come meanwhile is received within this time."""
@@ -48,7 +48,8 @@ class ModuleNode(ConfiguredNode):
     def __init__(self, row: Row, bus: IntraProcessBus | None = None) -> None:
         """Build the module from the node's parameters; the namespace is deputy1 unless it is remapped.
 
-        row: of the graph table. bus: joins the modules of one process.
+        row: of the graph table. bus: joins the modules of one process, of which each then has to `subscribe_inputs`
+        once all are there.
         """
         super().__init__(row.name, row.parameters, namespace="deputy1")
         self._bus = bus or IntraProcessBus()
@@ -62,8 +63,8 @@ class ModuleNode(ConfiguredNode):
         self._waiting: dict[str, list[tuple[int, Any]]] = {}
         self._catch_up_soon = self.create_wall_timer(SETTLING, self._catch_up)
         self._catch_up_soon.cancel()
-        for topic, record in {**self._instance.inputs, **self._instance.inputs_of_others}.items():
-            self._subscribe_input(topic, record)
+        if bus is None:
+            self.subscribe_inputs()
         self._answered, self._warning = 0, ""
         self._diagnostics = DiagnosticsPublisher(self, self.full_name(f"/{self._instance.deputy}"))
         self.create_wall_timer(PERIOD, self._diagnose)
@@ -84,34 +85,46 @@ class ModuleNode(ConfiguredNode):
 
         return publish_on_both
 
-    def _subscribe_input(self, topic: str, record: type) -> None:
-        if topic in self._bus:
-            self._bus.subscribe(topic, partial(self._take, topic))
-        else:
-            self.subscribe(record, topic, partial(self._receive, topic))
+    def subscribe_inputs(self) -> None:
+        """Take the inputs: over the bus where a module of this process publishes them."""
+        for topic, record in self._instance.inputs.items():
+            if topic in self._bus:
+                self._bus.subscribe(topic, partial(self._take, topic))
+            else:
+                self.subscribe(record, topic, partial(self._receive, topic))
 
     def _receive(self, topic: str, record: Any, about: Information) -> None:
         published = about["source_timestamp"]
-        if not self._waiting and time_ns() - published < LATE:
+        is_behind = topic == self._instance.needed[0] and self._instance.synchronizer.unanswered is not None
+        is_late = time_ns() - published >= LATE
+        if not self._waiting and not is_behind and not is_late:
+            self._catch_up_soon.timer_period_ns = SOON
             self._take(topic, record)
             return
-        if not self._waiting:
+        # Until a node has caught up, what was before its start may come in parts.
+        if not self._waiting or (is_late and self._catch_up_soon.timer_period_ns != SOON):
             self._catch_up_soon.reset()
         self._waiting.setdefault(topic, []).append((published, record))
 
     def _catch_up(self) -> None:
         """Go on with the last tick of those that wait, or with what the module cannot do without."""
         self._catch_up_soon.cancel()
-        self._catch_up_soon.timer_period_ns = SOON
-        records, self._waiting = self._waiting, {}
-        pacing = records.get(next(iter(self._instance.inputs)), [])
+        waiting, self._waiting = self._waiting, {}
+        records = {topic: _of_latest_run(messages) for topic, messages in waiting.items()}
+        pace = self._instance.needed[0]
+        pacing = records.get(pace, [])
         addressed = [record for published, record in pacing[:-1] if published >= self._started]
         addressed += [record for _, record in pacing[-1:]]
+        begun = self._instance.synchronizer.unanswered
+        if begun is not None and addressed and begun.time < addressed[0].time:
+            addressed.insert(0, begun)  # what it awaits may be among those that wait
         first = self._module.first_of(addressed).time if addressed else 0
+        kept = []
         for topic, messages in records.items():
-            kept = [record for _, record in messages if record.time >= first]
-            for record in kept if pacing else kept[-1:]:
-                self._take(topic, record)
+            begin = first - self._module.parameters.tick_ns * (topic in self._instance.delayed)
+            kept += [(topic, each) for _, each in messages if each.time >= begin]
+        for topic, record in sorted(kept, key=lambda each: (each[1].time, each[0] == pace)):
+            self._take(topic, record)
 
     def _take(self, topic: str, record: Any) -> None:
         """Answer the tick when the last input of its stamp is there; the outputs go first, others wait for them."""
@@ -124,7 +137,8 @@ class ModuleNode(ConfiguredNode):
         self._answered += 1
         spent = perf_counter() - started
         self._bus.deliver()
-        self._publish_timing(Timing(inputs[0].time, self._instance.row.name, round(spent * NANOSECONDS)))
+        name, spent_ns = self._instance.row.name, round(spent * NANOSECONDS)
+        self._publish_timing(Timing(inputs[0].time, name, spent_ns, missing(inputs)))
         self._publish_events()
 
     def _publish_events(self) -> None:
@@ -132,7 +146,7 @@ class ModuleNode(ConfiguredNode):
             self.publish_event(event)
             if event.kind in WARNINGS:
                 self._warning = str(event)
-            if event.kind in (EventKind.PARAMETERS, EventKind.REJECTED):
+            if event.kind in (EventKind.PARAMETERS, EventKind.REJECTED, EventKind.MODE):
                 self.show_parameters(dump(self._module.parameters))
 
     def _diagnose(self) -> None:
@@ -140,7 +154,7 @@ class ModuleNode(ConfiguredNode):
         level, message = DiagnosticStatus.OK, "answering"
         ignored = [each.topic for each in self.receptions if each.lock.ignored or each.misfits]
         if not self._answered:
-            level, message = DiagnosticStatus.WARN, f"waiting for {' and '.join(self._instance.inputs)}"
+            level, message = DiagnosticStatus.WARN, f"waiting for {' and '.join(self._instance.needed)}"
         elif self._module.waiting_for:
             level, message = DiagnosticStatus.WARN, f"waiting for {self._module.waiting_for}"
         elif self._warning:
@@ -150,7 +164,7 @@ class ModuleNode(ConfiguredNode):
         self._warning = ""
         values = {"tick": self._module.time // self._module.parameters.tick_ns, "answered": self._answered}
         values |= figures(self.receptions)
-        self._diagnostics.publish(level, message, values, self._module.time)
+        self._diagnostics.publish(level, message, values, self._module.time, self._module.conditions())
 
     def simulated_time(self) -> int:
         """Stamp (ns) of the module's latest tick."""
@@ -170,6 +184,12 @@ class ModuleNode(ConfiguredNode):
         """Let no design outlive the node."""
         self._designer.shutdown(wait=False, cancel_futures=True)
         super().destroy_node()
+
+
+def _of_latest_run(messages: list[tuple[int, Any]]) -> list[tuple[int, Any]]:
+    """Messages, each with when it was published, from the last one on whose stamp went back."""
+    backward = [place for place in range(1, len(messages)) if messages[place][1].time < messages[place - 1][1].time]
+    return messages[backward[-1] if backward else 0 :]
 
 
 def _answer_from(pool: ThreadPoolExecutor, service: Service, free: BoundedSemaphore) -> None:

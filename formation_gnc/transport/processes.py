@@ -4,6 +4,7 @@ import ctypes
 import os
 import signal
 import subprocess
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic, sleep
@@ -18,6 +19,10 @@ TIME_TO_CLOSE = 10.0
 """Wall time (s) that the recorder has to close its bag, which takes long on a busy machine."""
 
 
+RESPAWNS = 5
+"""Times that a node is started again; one that dies more often has a reason to."""
+
+
 class NodeDied(RuntimeError):
     """A node ended before the run; the message says which and why."""
 
@@ -29,6 +34,9 @@ class NodeProcess:
     name: str
     process: subprocess.Popen[bytes]
     log: Path
+    arguments: list[str]
+    respawns: int = 0
+    """Times that it may be started again."""
 
     def reason(self) -> str:
         """Why it ended, in words, with the last line of its log."""
@@ -59,12 +67,15 @@ class Graph:
         }
         self._directory = directory
 
-    def start(self, name: str, arguments: list[str]) -> NodeProcess:
-        """Start the node of this full name, such as ``/deputy1/controller``, in a session of its own."""
+    def start(self, name: str, arguments: list[str], respawns: int = 0) -> NodeProcess:
+        """Start the node of this full name, such as ``/deputy1/controller``, in a session of its own.
+
+        respawns: times that `respawn` may start it again.
+        """
         namespace, _, kind = name.rpartition("/")
         remap = ["-r", f"__ns:={namespace}"] if namespace else []
         log = self._directory / f"{name.strip('/').replace('/', '.')}.log"
-        with log.open("wb") as stream:
+        with log.open("ab") as stream:
             process = subprocess.Popen(
                 [executable(kind), "--ros-args", *remap, *arguments],
                 stdin=subprocess.DEVNULL,
@@ -74,15 +85,22 @@ class Graph:
                 start_new_session=True,
                 preexec_fn=_end_with_parent,  # before any thread is there that could hold a lock
             )
-        node = NodeProcess(name, process, log)
+        node = NodeProcess(name, process, log, arguments, respawns)
         self.nodes.append(node)
         return node
 
     def check(self) -> None:
-        """Raise NodeDied if a node has ended with an error."""
+        """Raise NodeDied if a node has ended with an error, and is not to be started again."""
         for node in self.nodes:
-            if node.process.poll() not in (None, 0):
+            if node.process.poll() not in (None, 0) and not node.respawns:
                 raise NodeDied(f"{node.name} ended: {node.reason()}")
+
+    def respawn(self) -> Iterator[str]:
+        """Start again what has ended with an error and may be; what ended and why, in words."""
+        for node in [each for each in self.nodes if each.respawns and each.process.poll() not in (None, 0)]:
+            self.nodes.remove(node)
+            self.start(node.name, node.arguments, node.respawns - 1)
+            yield f"{node.name} ended: {node.reason()}; started again"
 
     def stop(self) -> None:
         """Stop every node, the recorder last, after its queues are drained; kill what does not stop."""

@@ -2,10 +2,13 @@
 
 from dataclasses import dataclass
 from itertools import permutations
+from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from formation_gnc.flight.synchronizer import StampSynchronizer
+from formation_gnc.flight.synchronizer import InputTopics, StampSynchronizer
 
 OWN, SECOND, THIRD = "estimate", "/deputy2/estimate", "/deputy3/estimate"
 
@@ -19,7 +22,7 @@ class At:
 @pytest.fixture
 def fleet() -> StampSynchronizer:
     """A satellite's own estimate, needed, and those of two neighbours, optional."""
-    return StampSynchronizer((OWN, SECOND, THIRD), needed=1)
+    return StampSynchronizer(InputTopics((OWN,), optional=(SECOND, THIRD)))
 
 
 def groups(synchronizer: StampSynchronizer, *arrivals: tuple[str, int]) -> list[list[int | None]]:
@@ -62,7 +65,8 @@ def test_order_of_arrival_does_not_matter_after_a_silence(fleet: StampSynchroniz
 
 
 def test_needed_topic_is_always_waited_for() -> None:
-    pair = StampSynchronizer(("estimate", "target"), needed=2)
+    pair = StampSynchronizer(InputTopics(("estimate", "target")))
+    assert pair.unanswered is None
     assert groups(pair, ("estimate", 10), ("estimate", 20), ("estimate", 30)) == []
     assert groups(pair, ("target", 30)) == [[30, 30]]
 
@@ -79,3 +83,73 @@ def test_new_run_gets_no_record_of_the_previous_one(
     for time in (0, 10, 20, 30):
         now = At(time, run=2)
         assert [fleet.take(topic, now) for topic in order] == [None, None, [now] * 3]
+
+
+# --- inputs of the tick before
+
+MODE = "mode"
+
+
+def delayed(**changes: Any) -> StampSynchronizer:
+    return StampSynchronizer(InputTopics((OWN,), (MODE,), delay=10, **changes))
+
+
+def test_delayed_topic_is_taken_of_the_tick_before() -> None:
+    assert groups(delayed(), (OWN, 0), (MODE, 0), (OWN, 10), (MODE, 10), (OWN, 20)) == [[0, None], [10, 0], [20, 10]]
+
+
+def test_delayed_topic_is_waited_for() -> None:
+    waiting = delayed()
+    assert groups(waiting, (OWN, 0), (OWN, 10)) == [[0, None]]
+    assert groups(waiting, (MODE, 0)) == [[10, 0]]
+
+
+def test_delayed_topic_that_falls_silent_delays_one_tick_only() -> None:
+    silent = delayed()
+    assert groups(silent, (OWN, 0), (MODE, 0), (OWN, 10), (OWN, 20)) == [[0, None], [10, 0]]
+    # what was late for its tick counts for none
+    assert groups(silent, (OWN, 30), (MODE, 20)) == [[30, None]]
+    assert groups(silent, (MODE, 30), (OWN, 40), (MODE, 40), (OWN, 50)) == [[40, 30], [50, 40]]
+
+
+def test_restarted_reader_waits_for_the_tick_before() -> None:
+    assert groups(delayed(), (OWN, 50), (MODE, 40)) == [[50, 40]]
+
+
+def test_delayed_topics_are_there_where_the_pacing_record_says_so() -> None:
+    told = delayed(has_delayed=lambda record: record.run != 2)
+    assert told.take(OWN, At(0)) == [At(0), None]
+    assert told.take(MODE, At(0)) is None
+    assert told.take(OWN, At(10, run=2)) == [At(10, run=2), None]
+    assert told.take(OWN, At(20)) is None  # it was not missed at 10
+    assert told.take(MODE, At(10)) == [At(20), At(10)]
+
+
+def test_topic_that_nobody_has_is_not_waited_for() -> None:
+    assert groups(delayed(without=frozenset({MODE})), (OWN, 0), (OWN, 10)) == [[0, None], [10, None]]
+
+
+TICKS = st.lists(st.sets(st.sampled_from((OWN, SECOND, THIRD, MODE))), max_size=12)
+
+
+@given(TICKS)
+def test_whole_ticks_are_taken_as_record_by_record(ticks: list[set[str]]) -> None:
+    topics = InputTopics((OWN,), (MODE,), (SECOND, THIRD), delay=10)
+    single, whole = StampSynchronizer(topics), StampSynchronizer(topics)
+    before: dict[str, At] = {}
+    for number, given_topics in enumerate(ticks):
+        records = {topic: At(10 * number) for topic in given_topics}
+        taken = [single.take(topic, records[topic]) for topic in sorted(records, key=(OWN, SECOND, THIRD, MODE).index)]
+        assert next((each for each in taken if each), None) == whole.take_tick(records, before)
+        before = records
+
+
+def test_a_tick_is_unanswered_until_the_last_of_its_records_is_there() -> None:
+    """Whoever catches up may not leave out what that tick awaits."""
+    pair = delayed()
+    pair.take(OWN, At(10))
+    begun = pair.unanswered
+    assert begun is not None
+    assert begun.time == 10
+    pair.take(MODE, At(0))
+    assert pair.unanswered is None

@@ -41,7 +41,7 @@ def fly(
     estimates = {name: estimate(state, seconds, mass) for name, state, mass in zip(fleet, states, masses, strict=True)}
     targets = []
     for name, guidance in fleet.items():
-        target, _ = guidance.on_tick(estimates[name], *(estimates[other] for other in guidance.neighbours))
+        target, _ = guidance.on_tick(estimates[name], None, *(estimates[other] for other in guidance.neighbours))
         targets.append(target)
     return targets
 
@@ -69,10 +69,10 @@ def test_target_has_the_neighbours_in_the_order_of_the_fleet() -> None:
     states = on_the_ring(0.0)
     guidance = Guidance("/deputy2/guidance", parameters(slot=1))
     assert guidance.neighbours == ("deputy1", "deputy3", "deputy4")
-    target, _ = guidance.on_tick(estimate(states[1]), estimate(states[0]), None, estimate(states[3]))
+    target, _ = guidance.on_tick(estimate(states[1]), None, estimate(states[0]), None, estimate(states[3]))
     assert target.neighbours.tolist() == [states[0].tolist(), states[3].tolist()]
     target, _ = guidance.on_tick(
-        estimate(states[1], 1.0), estimate(states[0], 1.0), estimate(np.full(6, np.nan), 1.0), None
+        estimate(states[1], 1.0), None, estimate(states[0], 1.0), estimate(np.full(6, np.nan), 1.0), None
     )
     assert target.neighbours.tolist() == [states[0].tolist()]
 
@@ -86,7 +86,7 @@ def test_deputy_on_its_own_has_no_neighbour_and_no_separation() -> None:
 def test_predicted_separation_on_a_ring_is_the_side_of_its_square() -> None:
     states = on_the_ring(0.3)
     guidance = Guidance("/deputy1/guidance", parameters(phase=0.3, preview_steps=50, preview_step=60.0))
-    _, separation = guidance.on_tick(*map(estimate, states))
+    _, separation = guidance.on_tick(estimate(states[0]), None, *map(estimate, states[1:]))
     assert separation is not None
     # positions at right angles on y^2 + z^2 = 1 km, radially up to half as much more: |d|^2 = 2 + (dx)^2 with
     # dx of amplitude sqrt(2)/2, zero four times in two revolutions
@@ -104,7 +104,7 @@ def test_collision_course_is_found_between_points_and_reported_once() -> None:
     drifting[0] = 2000.0 / (3.0 * math.pi)
     # x = c, y' = -3/2 n c is free motion that falls back 3 pi c in a revolution, the distance to the neighbour
     drifting[4] = -1.5 * n * drifting[0]
-    _, separation = guidance.on_tick(estimate(behind), estimate(drifting))
+    _, separation = guidance.on_tick(estimate(behind), None, estimate(drifting))
     assert separation is not None
     assert separation.passive == pytest.approx(drifting[0], rel=1e-6)  # passes at that height
     assert separation.passive_time / NANOSECONDS == pytest.approx(
@@ -115,15 +115,15 @@ def test_collision_course_is_found_between_points_and_reported_once() -> None:
     drifting[0] *= 0.04
     drifting[4] *= 0.04
     drifting[1] = -900.0
-    assert guidance.on_tick(estimate(behind, 30.0), estimate(drifting, 30.0))[1] is None  # not due yet
+    assert guidance.on_tick(estimate(behind, 30.0), None, estimate(drifting, 30.0))[1] is None  # not due yet
     warnings = []
     for seconds in (60.0, 120.0):
-        _, separation = guidance.on_tick(estimate(behind, seconds), estimate(drifting, seconds))
+        _, separation = guidance.on_tick(estimate(behind, seconds), None, estimate(drifting, seconds))
         assert separation is not None
         assert separation.passive < 20.0
         warnings += [event.detail for event in guidance.take_events() if event.kind == EventKind.SEPARATION]
     assert len(warnings) == 1
-    guidance.on_tick(estimate(behind, 180.0), estimate(ahead, 180.0))
+    guidance.on_tick(estimate(behind, 180.0), None, estimate(ahead, 180.0))
     assert [event.detail for event in guidance.take_events() if event.kind == EventKind.SEPARATION] == ["over"]
 
 
@@ -186,14 +186,14 @@ def test_assignment_by_fuel_gives_the_emptier_tank_the_shorter_way() -> None:
 def test_slots_stay_until_every_satellite_has_a_state() -> None:
     guidance = Guidance("/deputy1/guidance", parameters(assignment="delta_v", slot=2))
     states = on_the_ring(0.0)
-    guidance.on_tick(estimate(states[0]), estimate(states[1]), None, estimate(states[3]))
+    guidance.on_tick(estimate(states[0]), None, estimate(states[1]), None, estimate(states[3]))
     assert guidance.parameters.slot == 2
-    guidance.on_tick(estimate(states[0], 1.0), estimate(states[1], 1.0), None, estimate(states[3], 1.0))
+    guidance.on_tick(estimate(states[0], 1.0), None, estimate(states[1], 1.0), None, estimate(states[3], 1.0))
     (event,) = guidance.take_events()
     assert (event.kind, event.subject) == (EventKind.WARNING, "deputy3")
-    guidance.on_tick(estimate(states[0], 2.0), *(estimate(state, 2.0) for state in states[1:]))
+    guidance.on_tick(estimate(states[0], 2.0), None, *(estimate(state, 2.0) for state in states[1:]))
     assert [event.kind for event in guidance.take_events()] == [EventKind.ASSIGNMENT]
-    guidance.on_tick(estimate(states[0], 3.0), *(estimate(state, 3.0) for state in states[1:]))
+    guidance.on_tick(estimate(states[0], 3.0), None, *(estimate(state, 3.0) for state in states[1:]))
     assert guidance.take_events() == []
 
 
@@ -201,10 +201,10 @@ def test_slots_stay_until_every_satellite_has_a_state() -> None:
 def test_implausible_state_counts_as_missing(state: Array) -> None:
     guidance = Guidance("/deputy1/guidance", parameters(assignment="delta_v", separation_warning=10.0))
     states = on_the_ring(0.0)
-    target, separation = guidance.on_tick(estimate(state), *map(estimate, states[1:]))
+    target, separation = guidance.on_tick(estimate(state), None, *map(estimate, states[1:]))
     assert (separation, len(target.neighbours)) == (None, 3)
     others = estimate(state, 1.0), estimate(states[2], 1.0), estimate(states[3], 1.0)
-    target, separation = guidance.on_tick(estimate(states[0], 1.0), *others)
+    target, separation = guidance.on_tick(estimate(states[0], 1.0), None, *others)
     assert separation is not None
     assert np.isfinite([separation.planned, separation.passive]).all()
     assert target.neighbours.tolist() == states[2:].tolist()
@@ -284,7 +284,7 @@ def test_planned_separation_has_neighbours_on_assigned_targets_or_coasting() -> 
         else:
             fly(fleet, states)
         estimates = [estimate(state, 60.0) for state in propagated(states, 60.0) + off]
-        _, separation = fleet["deputy1"].on_tick(*estimates)
+        _, separation = fleet["deputy1"].on_tick(estimates[0], None, *estimates[1:])
         assert separation is not None
         found[assignment] = separation
     # the side of the ring's square, sqrt(2) km, less for neighbours 500 m off
@@ -297,15 +297,15 @@ def test_planned_separation_has_neighbours_on_assigned_targets_or_coasting() -> 
 def test_slot_occupied_by_a_neighbour_is_rejected_in_flight() -> None:
     states = on_the_ring(0.0)
     guidance = Guidance("/deputy1/guidance", parameters())
-    guidance.on_tick(*map(estimate, states))
+    guidance.on_tick(estimate(states[0]), None, *map(estimate, states[1:]))
     with pytest.raises(ConfigurationError, match="deputy3 is there"):
         guidance.stage({"slot": 2})
     assert guidance.parameters.slot == 0
     off = states + np.array([2.0, -3.0, 2.0, 0.001, 0.002, -0.001])  # control errors
-    guidance.on_tick(*(estimate(state, 0.5) for state in off))
+    guidance.on_tick(estimate(off[0], 0.5), None, *(estimate(state, 0.5) for state in off[1:]))
     with pytest.raises(ConfigurationError, match="deputy3 is there"):
         guidance.stage({"slot": 2})
     guidance.stage({"slot": 2, "projected_circular_orbit.size": 1500.0})
     states[2, 3:] *= -1.0  # passes through, and does not occupy it
-    guidance.on_tick(*(estimate(state, 1.0) for state in states))
+    guidance.on_tick(estimate(states[0], 1.0), None, *(estimate(state, 1.0) for state in states[1:]))
     guidance.stage({"slot": 2})

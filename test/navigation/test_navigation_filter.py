@@ -13,6 +13,7 @@ from scipy.stats import chi2
 
 from formation_gnc.common import Orbit
 from formation_gnc.errors import ConfigurationError
+from formation_gnc.mode_records import Mode, ModeState, Restriction
 from formation_gnc.navigation.kernels.motion import coast
 from formation_gnc.navigation.navigation_filter import NavigationFilter
 from formation_gnc.navigation.observability import (
@@ -651,6 +652,27 @@ def test_readings_of_unused_sensors_change_nothing() -> None:
     one, other = run(navigation_filter(setup), samples)[-1], run(navigation_filter(setup), bare)[-1]
     assert one.covariance.tobytes() == other.covariance.tobytes()
     assert not one.rejections
+
+
+def test_an_isolated_sensor_is_compared_and_changes_nothing() -> None:
+    """However far off: state and covariance are those without the sensor, bit for bit."""
+    setup = parameters(tick=10.0)
+    samples = list(simulate(setup, 100, np.random.default_rng(31)))
+    alone = run(navigation_filter(replace(setup, sensors=THREE[1:])), samples)
+    filter = navigation_filter(setup)
+    mode = ModeState(0, Mode.KEEP, Mode.KEEP, 0, restrictions=[Restriction("sensor", "radius", "at fault")])
+    for sample, expected in zip(samples, alone, strict=True):
+        estimate = filter.on_tick(off_by(sample.measurement, 1e5), mode)
+        assert estimate is not None
+        assert estimate.relative_state.tobytes() == expected.relative_state.tobytes()
+        assert estimate.covariance.tobytes() == expected.covariance.tobytes()
+        assert (estimate.nis, estimate.status) == (expected.nis, expected.status)
+        assert {each.sensor: each.rejection for each in estimate.innovations} == {
+            "radius": Rejection.ISOLATED,
+            "range_rate": "",
+            "latitude": "",
+        }
+        assert estimate.rejections == []
 
 
 def test_a_sensor_in_use_that_never_reads_is_reported() -> None:

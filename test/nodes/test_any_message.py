@@ -24,7 +24,8 @@ from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import Scenario, load_scenario
 from formation_gnc.transport.conversion import codec, from_cdr, message_type, received, to_cdr, type_name
 
-NAMES = st.sampled_from(["", "deputy1", "radius", "range_rate", "latitude", "lqr", "gate", "ä\U0001f6f0", "x" * 300])
+WORDS = ["", "deputy1", "radius", "range_rate", "latitude", "lqr", "gate", "keep", "safe", "sensor"]
+NAMES = st.sampled_from([*WORDS, "ä\U0001f6f0", "x" * 300])
 DOUBLES = st.floats(width=64) | st.sampled_from([0.0, 1.0, 1e-300, 1e308, float("nan"), float("inf")])
 STAMPS = st.integers(-(2**31) * 10**9, (2**31 - 1) * 10**9) | st.sampled_from([0, 10**9, 2 * 10**9])
 
@@ -93,7 +94,7 @@ def messages(each: Input) -> st.SearchStrategy[bytes]:
     return any_record(each.topic.record).map(to_cdr)
 
 
-CASES = [(row, each) for row in GRAPH for each in (*row.takes, *row.takes_of_others)]
+CASES = [(row, each) for row in GRAPH for each in (*row.takes, *row.takes_of_before, *row.takes_of_others)]
 
 
 @pytest.mark.thorough
@@ -111,10 +112,10 @@ def test_a_module_stands_any_message_and_answers_the_next_tick(
         inputs = instance.synchronizer.take(topic, record)
         return instance.respond(inputs) if inputs is not None else []
 
-    everything = {**instance.inputs, **instance.inputs_of_others}
+    everything = instance.inputs
     for topic, kind in everything.items():
         take(topic, from_cdr(kind, to_cdr(flown[topic][0])))
-    name = hostile.topic.of("deputy1" if hostile in row.takes else "deputy2")
+    name = hostile.topic.of("deputy2" if hostile in row.takes_of_others and hostile not in row.takes else "deputy1")
     for _ in range(2):
         try:
             bad = received(hostile.record)(data.draw(messages(hostile)))

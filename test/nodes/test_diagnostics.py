@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from formation_gnc.flight.graph import MODULES
 from formation_gnc.sil.report import Report
 from formation_gnc.transport.diagnostics import RUN, DiagnosticsPublisher, subscribe_to_reports
 
@@ -28,7 +29,7 @@ def test_every_node_has_a_status_and_waiting_is_a_warning(bench: Bench, name: st
     bench.spin(node, until=lambda: bool(heard))
     (status, *_) = heard
     assert status.name == (RUN if name == "plant" else f"formation_gnc: {node.get_fully_qualified_name()}")
-    assert status.hardware_id == ("/deputy1" if name in ("navigation", "guidance", "controller") else "/")
+    assert status.hardware_id == ("/deputy1" if name in MODULES else "/")
     assert status.level == (DiagnosticStatus.OK if name == "replay" else DiagnosticStatus.WARN)
     assert "waiting for" in status.message or name == "replay"
 

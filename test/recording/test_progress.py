@@ -12,7 +12,8 @@ from formation_gnc.records import Event, EventKind
 PLANT = (topics.CLOCK.name, topics.TRUTH.name)
 DEPUTIES = ("deputy1", "deputy2")
 MEASUREMENTS = tuple(topics.MEASUREMENT.of(name) for name in DEPUTIES)
-ANSWERS = tuple(topic.of(name) for name in DEPUTIES for topic in (topics.ESTIMATE, topics.TARGET, topics.THRUST))
+GIVEN = (topics.ESTIMATE, topics.TARGET, topics.THRUST, topics.MODE)
+ANSWERS = tuple(topic.of(name) for name in DEPUTIES for topic in GIVEN)
 TICK = (*PLANT, *MEASUREMENTS, *ANSWERS)
 
 
@@ -51,6 +52,21 @@ def test_a_miss_counts_instead_of_the_answers() -> None:
     assert progress.stamp == 0
     progress.take_event(miss(1, "deputy2"))
     assert progress.stamp == 1
+
+
+def test_a_supervisor_that_died_holds_nothing_up_after_the_tick_it_costs() -> None:
+    progress = recorded(0)
+    for tick in (1, 2):
+        for topic in TICK:
+            if topic != topics.MODE.of("deputy1"):
+                progress.take(topic, tick)
+    assert progress.stamp == 0
+    progress.take_event(miss(2, "deputy1"))
+    assert progress.stamp == 2
+    for topic in TICK:
+        if topic != topics.MODE.of("deputy1"):
+            progress.take(topic, 3)
+    assert progress.stamp == 3
 
 
 def test_the_end_of_the_run_counts_when_all_else_has_come() -> None:

@@ -25,7 +25,7 @@ from formation_gnc.transport.processes import executable
 GNC_TOPICS = (
     "/clock",
     "/truth",
-    *(f"/deputy1/{topic}" for topic in ("measurement", "estimate", "target", "thrust", "status")),
+    *(f"/deputy1/{topic}" for topic in ("measurement", "estimate", "target", "thrust", "status", "mode")),
 )
 PARTS = tuple(MODULES)
 PATIENCE = 90.0  # s of wall time, for a machine that is busy with other things

@@ -245,6 +245,18 @@ def test_a_node_that_dies_ends_the_run_and_is_named(sil: StartSil, victim: str) 
     assert Bag(run.bag).topics["/truth"].count > 0, "what was recorded is readable"
 
 
+def test_a_node_that_dies_is_started_again_where_asked(sil: StartSil) -> None:
+    run = sil("--respawn", "--real-time-factor", "20", "--duration", "300")
+    run.wait_for_flight()
+    os.kill(run.children()["guidance"], signal.SIGKILL)
+    status, _, errors = run.finish()
+    assert status == 0, errors
+    assert "/deputy1/guidance ended: killed by SIGKILL" in errors
+    assert "started again" in errors
+    assert Bag(run.bag).topics["/truth"].count == 300
+    assert Bag(run.bag).restarts(["/deputy1/target"])["/deputy1/target"]
+
+
 def test_the_nodes_end_when_the_command_is_killed(sil: StartSil) -> None:
     run = sil("--real-time-factor", "200")
     run.wait_for_flight()

@@ -16,7 +16,7 @@ from formation_gnc.sil.simulation import RECORDER_LAG
 
 TICKS = 10
 EVERYBODY = {row.answer.of("deputy1") for row in GRAPH}
-ANSWERS = ", ".join(f"{row.answer.of('deputy1')} ({row.name})" for row in GRAPH)
+ANSWERS = ", ".join(f"{row.answer.of('deputy1')} ({row.name})" for row in list(GRAPH)[:3])
 
 
 class Graph:
@@ -90,12 +90,12 @@ def complete(graph: Graph) -> Graph:
 def test_of_many_topics_without_publisher_three_are_named(graph: Graph) -> None:
     fleet = load_scenario("tetrahedral", {"/plant": {"duration": 3.0}}).plant
     PlantExecutive(fleet, graph).check(0.0)
-    assert graph.said == [f"waiting for a publisher of {ANSWERS} and 9 more"]
+    assert graph.said == [f"waiting for a publisher of {ANSWERS} and {4 * len(GRAPH) - 3} more"]
 
 
 def test_the_run_starts_when_every_answer_has_a_publisher(graph: Graph) -> None:
     executive = start(graph)
-    assert graph.said == [f"waiting for a publisher of {ANSWERS}"]
+    assert graph.said == [f"waiting for a publisher of {ANSWERS} and {len(GRAPH) - 3} more"]
     graph.published = EVERYBODY - {COMMAND.of("deputy1")}
     executive.check(0.1)
     assert graph.said[-1] == "waiting for a publisher of /deputy1/thrust (controller)"

@@ -36,7 +36,7 @@ def test_an_unchanged_replay_of_a_graph_run_gives_the_recorded_bits(
     assert main(["replay", str(recorded.path), "--bag", str(tmp_path / "again")]) == 0
     again = Bag(tmp_path / "again")
     assert list(again.arrays("/events")["kind"]).count(EventKind.PARAMETERS) == 2
-    assert again.topics["/deputy1/timing"].count == 900, "of every part at every tick"
+    assert again.topics["/deputy1/timing"].count == 1200, "of every part at every tick"
     assert identical(recorded, again, gnc_topics(recorded)) == []
 
 
@@ -49,11 +49,29 @@ def test_a_flight_with_faults_has_its_bits_on_graph_in_process_and_again(
         "{at: 60.0, deputy: deputy1, fault: outliers, sensor: latitude, share: 0.2}",
         "{at: 70.0, deputy: deputy1, fault: stuck_on, force: [0.002, 0.0, 0.0], told: false}",
         "{at: 80.0, until: 150.0, deputy: deputy1, fault: chief_drift, rate: [0.0, 0.5, 0.0]}",
+        "{at: 100.0, until: 180.0, deputy: deputy1, fault: freeze, sensor: range_rate}",
     ]
+    # what monitors find is their own affair: here one of them isolates, returns and switches, and modes are commanded
+    scenario["/**/supervisor"] = {
+        "ros__parameters": {
+            "fault_table": [
+                "{monitor: frozen_readings, response: isolate_sensor, return: 20}",
+                "{monitor: frozen_readings, response: switch_law, laws: [sdre], return: 40}",
+            ],
+            "schedule": ["{at: 20.0, mode: standby}", "{at: 40.0, mode: safe}", "{at: 60.0, mode: acquire}"],
+        }
+    }
     path = tmp_path / "faults.yaml"
     path.write_text(yaml.safe_dump(scenario))
     recorded = fly("--duration", "300", scenario=str(path))
-    assert list(recorded.arrays("/events")["kind"]).count(EventKind.FAULT) == 6
+    assert list(recorded.arrays("/events")["kind"]).count(EventKind.FAULT) == 8
+    modes, restricted = (
+        recorded.arrays("/deputy1/mode")["mode"],
+        recorded.arrays("/deputy1/mode")["restrictions.0.subject"],
+    )
+    assert list(modes[[0, 20, 40, 60]]) == ["acquire", "standby", "safe", "acquire"]
+    assert set(filter(None, restricted)) == {"range_rate", "sdre"}
+    assert set(recorded.arrays("/deputy1/status")["algorithm"]) == {"lqr", "sdre"}
     inside, again = tmp_path / "inside", tmp_path / "again"
     assert main(["sil", str(path), "--duration", "300", "--in-process", "--bag", str(inside), "--accept-lost"]) == 0
     assert main(["replay", str(recorded.path), "--bag", str(again)]) == 0
@@ -68,6 +86,7 @@ def test_nodes_restarted_with_other_parameters_replay_with_them(desk: Desk, caps
         "controller": {"algorithm": "mpc"},
         "guidance": {"leader_follower.separation": 120.0},
         "navigation": {"radius_sigma": 50.0},
+        "supervisor": {"tube": 20.0},
     }
     for kind, parameters in otherwise.items():
         time.sleep(2.0)
@@ -78,12 +97,8 @@ def test_nodes_restarted_with_other_parameters_replay_with_them(desk: Desk, caps
     assert plant.wait() == 0
     desk.land()
     recorded = Bag(bag)
-    starts = recorded.restarts(["/deputy1/thrust", "/deputy1/target", "/deputy1/estimate"])
-    assert {topic: len(stamps) for topic, stamps in starts.items()} == {
-        "/deputy1/thrust": 1,
-        "/deputy1/target": 1,
-        "/deputy1/estimate": 1,
-    }
+    answers = [f"/deputy1/{name}" for name in ("thrust", "target", "estimate", "mode")]
+    assert {topic: len(stamps) for topic, stamps in recorded.restarts(answers).items()} == dict.fromkeys(answers, 1)
     assert recorded.arrays("/deputy1/status")["algorithm"][[0, -1]].tolist() == ["lqr", "mpc"]
     assert recorded.arrays("/deputy1/target")["relative_state"][[0, -1], 1].round().tolist() == [-100, -120]
     for topic in GNC_TOPICS:  # a node that comes back goes on: it does not answer what it is told of before

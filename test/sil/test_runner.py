@@ -276,8 +276,8 @@ def test_a_deputy_without_an_estimate_misses_ticks_and_recovers_by_fix(
     run, records = Run(load_scenario("leader_follower")), Records()
     think = run.instances["/deputy1/navigation"].module.on_tick
 
-    def lost(measurement: Any) -> Any:
-        return None if 10 <= run.plant.tick < 13 else think(measurement)
+    def lost(measurement: Any, mode: Any) -> Any:
+        return None if 10 <= run.plant.tick < 13 else think(measurement, mode)
 
     monkeypatch.setattr(run.instances["/deputy1/navigation"].module, "on_tick", lost)
     for _ in range(20):
@@ -310,7 +310,7 @@ def test_a_satellite_without_an_estimate_costs_its_fleet_one_tick(
     run = Run(load_scenario("tetrahedral"))
     silent = run.instances["/deputy2/navigation"].module
     answer = silent.on_tick
-    monkeypatch.setattr(silent, "on_tick", lambda seen: None if run.plant.tick == 3 else answer(seen))
+    monkeypatch.setattr(silent, "on_tick", lambda *seen: None if run.plant.tick == 3 else answer(*seen))
     records: dict[str, list[Any]] = {}
     for _ in range(7):
         run.tick(lambda topic, record: records.setdefault(topic, []).append(record))

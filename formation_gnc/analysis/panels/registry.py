@@ -4,6 +4,7 @@ from formation_gnc.analysis.panels.control_error import CONTROL_ERROR, CONTROL_E
 from formation_gnc.analysis.panels.distances import DISTANCES
 from formation_gnc.analysis.panels.estimation_error import POSITION_ERROR, VELOCITY_ERROR
 from formation_gnc.analysis.panels.innovations import INNOVATIONS
+from formation_gnc.analysis.panels.modes import MODES
 from formation_gnc.analysis.panels.panel import DeputyPanel, FleetPanel
 from formation_gnc.analysis.panels.path import PATH
 from formation_gnc.analysis.panels.readings import READINGS
@@ -19,6 +20,7 @@ FLEET_PANELS: list[FleetPanel] = [
 
 DEPUTY_PANELS: list[DeputyPanel] = [
     PATH,
+    MODES,
     CONTROL_ERROR,
     CONTROL_ERROR_BY_AXIS,
     POSITION_ERROR,

@@ -72,7 +72,7 @@ def test_begin_and_end_of_a_fault_are_events_with_its_numbers(fly: Fly) -> None:
 def test_a_fault_is_no_warning_and_no_input_of_the_flight_software() -> None:
     assert EventKind.FAULT not in WARNINGS
     for row in GRAPH:
-        assert topics.EVENTS not in [each.topic for each in (*row.takes, *row.takes_of_others)]
+        assert topics.EVENTS not in [each.topic for each in (*row.takes, *row.takes_of_before, *row.takes_of_others)]
 
 
 def test_a_fault_beyond_the_end_of_the_run_does_nothing(fly: Fly) -> None:

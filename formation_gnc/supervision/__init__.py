@@ -1,0 +1,1 @@
+"""Supervision of one satellite: modes, health monitors, and the answers to faults."""

@@ -1,0 +1,1 @@
+"""Health monitors, one file each."""

@@ -1,0 +1,47 @@
+"""Mass telemetry against the propellant used."""
+
+from formation_gnc.supervision.monitor import Monitor, Observation, When
+from formation_gnc.supervision.thrust_tally import ThrustTally
+from formation_gnc.types import NANOSECONDS
+
+GAUGE, USED = 0.01, 0.1
+"""Allowed difference: a share of the initial mass, and one of the propellant used."""
+
+
+class Mass(Monitor):
+    """Difference of the mass told from the initial mass less what the applied force has cost, over the allowance.
+
+    Assumes: a constant specific impulse, and telemetry of the applied force. Over ticks that were not observed, the
+    mass told is taken within what the thrusters can have burned.
+    Cannot see: a leak below a hundredth of the mass.
+    Delay: ten ticks for a jump beyond the allowance.
+    """
+
+    name = "mass"
+    title = "mass told against propellant used"
+    test = "bound, 1 % of the initial mass and 10 % of the propellant used"
+    when = When.SLOW | When.GAP
+
+    def prepare(self) -> None:
+        """The mass at the start of a flight."""
+        self._start, self._last = self.parameters.mass, 0
+
+    def feed(self, observation: Observation) -> None:
+        """Judge, but where it has just been anchored."""
+        measurement, thrust = observation.measurement, observation.thrust
+        if measurement is None:
+            return
+        if observation.missed:
+            self._anchor(measurement.mass, (observation.time - self._last) / NANOSECONDS, thrust)
+        self._last = observation.time
+        if not observation.missed:
+            expected = self._start - thrust.burned
+            allowed = GAUGE * self.parameters.mass + USED * max(0.0, self.parameters.mass - expected)
+            self.judge("", abs(measurement.mass - expected) / allowed, 0.5, 1.0)
+
+    def _anchor(self, mass: float, seconds: float, thrust: ThrustTally) -> None:
+        """Take the mass told, within what may have been burned since the last observation."""
+        expected = self._start - thrust.burned
+        least = max(expected - thrust.largest_rate * seconds, self.parameters.dry_mass)
+        if mass == mass:
+            self._start = min(max(mass, least), expected) + thrust.burned

@@ -1,0 +1,343 @@
+"""Supervision of one deputy, from the records of a tick to its mode and health."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import cache
+
+from formation_gnc.common import ANY_ORBIT
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.flight.module import Condition, Configuration, FlightModule
+from formation_gnc.mode_records import (
+    NO_FORCE,
+    HealthReport,
+    Mode,
+    ModeState,
+    MonitorStatus,
+    Restriction,
+    RestrictionKind,
+)
+from formation_gnc.parameters import change
+from formation_gnc.records import (
+    NO_NEIGHBOURS,
+    Estimate,
+    EstimateStatus,
+    EventKind,
+    Measurement,
+    Status,
+    Target,
+    Thrust,
+)
+from formation_gnc.sensors.registry import sensors
+from formation_gnc.supervision.fault_table import DEFAULT, Entry, Response, parse, table_of
+from formation_gnc.supervision.health import Health
+from formation_gnc.supervision.modes import COMMANDS, FAULTS, Step, Trigger, refusal, step
+from formation_gnc.supervision.monitor import AXES, Level, Verdict
+from formation_gnc.supervision.parameters import SupervisorParameters
+from formation_gnc.supervision.registry import MONITORS
+from formation_gnc.supervision.responses import ActiveResponse, FaultResponses
+from formation_gnc.supervision.safe import Evasion, plan_evasion
+
+LEFT = 1.5
+"""Control error, over the tube, beyond which the target counts as left."""
+
+QUIET = 60
+"""Ticks without a failure after which the next one is reported again."""
+
+EVASIVE = frozenset({Mode.AVOID, Mode.SAFE})
+"""Modes that begin with a plan."""
+
+RESTRICTIONS = {
+    Response.ISOLATE_SENSOR: RestrictionKind.SENSOR,
+    Response.ISOLATE_AXIS: RestrictionKind.AXIS,
+    Response.SWITCH_LAW: RestrictionKind.LAW,
+}
+"""What modules do without, by response."""
+
+UNTRUSTED = frozenset({"innovation_consistency", "estimate_jump", "chief_ephemeris"})
+"""Monitors whose failure says that the estimate is not to be steered by."""
+
+SEPARATION = "separation"
+"""Monitor by which `avoid` ends."""
+
+type Design = tuple[Entry, ...]
+
+_decide = cache(step)
+"""The same triggers come at tick after tick."""
+
+
+class Supervisor(FlightModule[SupervisorParameters, Design]):
+    """Mode and health of one deputy, at every tick that has a measurement, whatever the other modules do.
+
+    At a tick it judges the one before, whose records are complete then: a module that has not answered it is
+    known by the acquisition fix of the measurement. What it says holds from the next tick on. The parameter `mode`
+    is a command when it is set, and follows the mode in force otherwise. One that is started again in flight goes
+    on with the mode that the controller obeys.
+    """
+
+    def reset(self) -> None:
+        """The mode of the parameters, monitors without a memory, no fault."""
+        self._mode = Mode(self.parameters.mode)
+        self._health = Health(self.parameters)
+        self._responses = FaultResponses(self.configuration.design)
+        self._active: list[ActiveResponse] = []
+        self._restrictions: list[Restriction] = []
+        self._blinded = ""
+        """Why no sensor is left to trust; empty while one is."""
+        self._failed: dict[tuple[str, str], int] = {}
+        """Time (ns) of the latest failure by monitor and subject."""
+        self._statuses: list[tuple[str, str, Level]] | None = None
+        self._command: Trigger | None = None
+        self._evasion: Evasion | None = None
+        self._reason, self._since = "", 0
+        self._in_force = self._mode
+        """Mode over the tick before."""
+        self._before: Measurement | None = None
+
+    def design(self, parameters: SupervisorParameters) -> Design:
+        """The fault table; raises ConfigurationError for one that is not allowed."""
+        subjects = {name: monitor.subjects(parameters) for name, monitor in MONITORS.items()}
+        return parse(parameters.fault_table, subjects, tuple(sensors()), AXES)
+
+    def check_staged(self, staged: Configuration[SupervisorParameters, Design]) -> None:
+        """Refuse a mode that may not be commanded now."""
+        self._check_command(staged)
+
+    def check_due(self, time: int, due: Configuration[SupervisorParameters, Design]) -> None:
+        """Refuse a mode that may not be commanded at its tick."""
+        self._check_command(due)
+
+    def first_of(self, waiting: Sequence[Measurement]) -> Measurement:
+        """The first: nothing waits for it in the same tick, so that it may be behind, and every tick has a mode."""
+        return waiting[0]
+
+    def has_delayed_inputs(self, pacing: Measurement) -> bool:
+        """Whether the tick before was answered: an acquisition fix comes when it was not."""
+        return not pacing.fix_available
+
+    def _check_command(self, wanted: Configuration[SupervisorParameters, Design]) -> None:
+        if "mode" not in wanted.changes:
+            return
+        mode = Mode(wanted.changes["mode"])
+        if mode is not self._mode and (reason := refusal(self._mode, mode)):
+            raise ConfigurationError(f"mode {mode}: refused in {self._mode}; {reason}")
+
+    def activate(
+        self,
+        old: Configuration[SupervisorParameters, Design],
+        new: Configuration[SupervisorParameters, Design],
+    ) -> None:
+        """Take a command; begin anew with other monitors or another table."""
+        if "mode" in new.changes and new.parameters.mode != self._mode:
+            self._command = COMMANDS[Mode(new.parameters.mode)]
+            self._responses.release()
+        if new.design != old.design or "enabled" in new.changes:
+            self._responses = FaultResponses(new.design)
+            self._report(self.time, [])
+            self._active, self._restrictions, self._blinded = [], [], ""
+        if new.changes.keys() - {"mode", "fault_table", "schedule"}:
+            self._health = Health(new.parameters)
+
+    def on_tick(
+        self,
+        measurement: Measurement,
+        estimate: Estimate | None = None,
+        target: Target | None = None,
+        status: Status | None = None,
+        thrust: Thrust | None = None,
+    ) -> tuple[ModeState | None, HealthReport | None]:
+        """Mode at the measurement's stamp, and health where it has changed; neither for a measurement out of order.
+
+        The other records are of the tick before, each None where there is none. A measurement of an earlier time
+        begins a new run if it has an acquisition fix.
+        """
+        time, before = measurement.time, self._before
+        if before is not None and (time == before.time or (time < before.time and not measurement.fix_available)):
+            return None, None
+        self.begin_tick(time)
+        before = self._before
+        if before is None and status is not None and status.mode in Mode:
+            self._mode = self._in_force = Mode(status.mode)
+        triggers = self._events(estimate, target)
+        if self.parameters.enabled and (before is not None or estimate is not None):
+            self._judge(time, before, estimate, target, status, thrust)
+        self._before = measurement
+        if self._mode is Mode.AVOID and self._is_restored(target):
+            triggers.append(Trigger.SEPARATION_RESTORED)
+        return self._decide(time, triggers, estimate, target), self._health_report(time)
+
+    def _judge(
+        self,
+        time: int,
+        measurement: Measurement | None,
+        estimate: Estimate | None,
+        target: Target | None,
+        status: Status | None,
+        thrust: Thrust | None,
+    ) -> None:
+        """Feed the monitors with the tick before a time (ns), and update the responses."""
+        tick = self.parameters.tick_ns
+        ticks = 1
+        if measurement is not None and measurement.time != time - tick:
+            ticks, measurement = (time - measurement.time) // tick, None
+        self._health.feed(time - tick, self._in_force, measurement, estimate, target, status, thrust)
+        failures = [each for each in self._health.notable() if each.level is Level.FAILED]
+        for each in failures:
+            key = each.monitor, each.subject
+            if time - self._failed.get(key, -time) > QUIET * tick or key not in self._failed:
+                detail = f"{each.monitor}: {each.statistic:.3g}, where {each.threshold:.3g} is the limit"
+                self.log(time, EventKind.DETECTION, detail, each.subject)
+            self._failed[key] = time
+        active = self._responses.evaluate([(each.monitor, each.subject) for each in failures], ticks, self._mode)
+        if active != self._active:
+            self._report(time, active)
+            self._active = active
+            self._restrictions = list(self._restricted())
+
+    def _decide(
+        self, time: int, triggers: list[Trigger], estimate: Estimate | None, target: Target | None
+    ) -> ModeState:
+        faults = dict[Trigger, str]()
+        for each in self._active:
+            if each.response is Response.GO_TO and each.entry.mode is not None:
+                faults.setdefault(FAULTS[each.entry.mode], each.cause)
+        if self._blinded and self._mode is not Mode.STANDBY:  # which steers by nothing
+            faults.setdefault(FAULTS[Mode.SAFE], self._blinded)
+        if self._command is not None:
+            triggers.append(self._command)
+        self._command = None
+        before, decided = self._mode, _decide(self._mode, (*triggers, *faults))
+        for trigger, reason in decided.refusals:
+            self.log(time, EventKind.REJECTED, f"{trigger}: {reason}", "mode")
+        if decided.mode is not before:
+            self._enter(time, decided, faults, estimate, target)
+        self._in_force = before
+        if self.parameters.mode != self._mode:
+            parameters = change(self.parameters, {"mode": str(self._mode)})
+            self.configuration = replace(self.configuration, parameters=parameters)
+        force = NO_FORCE if self._evasion is None else self._evasion.force(time + self.parameters.tick_ns)
+        return ModeState(time, str(self._mode), str(before), self._since, self._reason, force, self._restrictions)
+
+    def _enter(
+        self,
+        time: int,
+        decided: Step,
+        faults: dict[Trigger, str],
+        estimate: Estimate | None,
+        target: Target | None,
+    ) -> None:
+        """Go to another mode, from the tick after a time (ns) on."""
+        before, self._mode = self._mode, decided.mode
+        self._since = time + self.parameters.tick_ns
+        trigger = decided.trigger
+        self._reason = "" if trigger is None else f"{trigger}, {faults[trigger]}" if trigger in faults else str(trigger)
+        detail = f"from {before}: {self._reason}"
+        self._evasion = None
+        if self._mode in EVASIVE:
+            self._evasion = self._way_out(estimate, target)
+            detail += f"; {self._evasion.words}"
+        self.log(time, EventKind.MODE, detail, str(self._mode))
+
+    def _way_out(self, estimate: Estimate | None, target: Target | None) -> Evasion:
+        """The way out: away from the neighbours that guidance knows, with the axes that work."""
+        broken = {each.subject for each in self._restrictions if each.kind == RestrictionKind.AXIS}
+        failing = {each.monitor for each in self._health.notable() if each.level is Level.FAILED}
+        return plan_evasion(
+            self._mode,
+            self._since,
+            estimate,
+            self.parameters,
+            NO_NEIGHBOURS if target is None else target.neighbours,
+            broken,
+            not self._blinded and UNTRUSTED.isdisjoint(failing),
+        )
+
+    def _events(self, estimate: Estimate | None, target: Target | None) -> list[Trigger]:
+        """Triggers by estimate and target of the tick before."""
+        if estimate is None:
+            return [] if self._before is None else [Trigger.STATE_LOST]
+        triggers = [Trigger.ACQUIRED] if estimate.status == EstimateStatus.ACQUIRED else []
+        if target is None:
+            return triggers
+        if target.reconfiguring:
+            triggers.append(Trigger.RECONFIGURATION_BEGAN)
+        elif self._mode is Mode.RECONFIGURE:
+            triggers.append(Trigger.RECONFIGURATION_ENDED)
+        dx, dy, dz = (estimate.relative_state[:3] - target.relative_state[:3]).tolist()
+        square, tube = dx * dx + dy * dy + dz * dz, self.parameters.tube
+        if square <= tube * tube:
+            triggers.append(Trigger.TARGET_REACHED)
+        elif not square <= (LEFT * tube) ** 2:  # true for NaN
+            triggers.append(Trigger.TARGET_LEFT)
+        return triggers
+
+    def _is_restored(self, target: Target | None) -> bool:
+        """Whether a prediction made after the last burn is above the limit."""
+        predicted = [] if target is None else target.separation
+        if not predicted or self.parameters.least_separation <= 0.0 or not self.parameters.enabled:
+            return False
+        is_low = any(each.monitor == SEPARATION and each.level is Level.FAILED for each in self._health.notable())
+        ended = self._since if self._evasion is None else self._evasion.end
+        return predicted[0].time >= ended and not is_low
+
+    def _report(self, time: int, active: list[ActiveResponse]) -> None:
+        """Log responses that begin or end; a detection is warning enough."""
+        changes = [("begins", each) for each in active if each not in self._active]
+        changes += [("ends", each) for each in self._active if each not in active]
+        for verb, each in changes:
+            if each.entry.response is not Response.WARN:
+                self.log(time, EventKind.RESPONSE, f"{verb}: {each}", each.subject)
+
+    def _restricted(self) -> Iterator[Restriction]:
+        """What modules do without, each once."""
+        self._blinded = ""
+        known = set[tuple[RestrictionKind, str]]()
+        sensors_left = len(self.parameters.sensors)
+        for each in self._active:
+            kind = RESTRICTIONS.get(each.response)
+            for subject in each.entry.laws or (each.subject,) if kind else ():
+                if kind is None or (kind, subject) in known:
+                    continue
+                if kind is RestrictionKind.SENSOR:
+                    if sensors_left == 1:  # without any the state would be lost
+                        self._blinded = f"{each.cause}: the last sensor"
+                        continue
+                    sensors_left -= 1
+                known.add((kind, subject))
+                yield Restriction(str(kind), subject, each.cause)
+
+    def _health_report(self, time: int) -> HealthReport | None:
+        """The verdicts that are not well, where subjects or levels have changed."""
+        notable = self._health.notable() if self.parameters.enabled else []
+        statuses = [(each.monitor, each.subject, each.level) for each in notable]
+        if statuses == self._statuses:
+            return None
+        self._statuses = statuses
+        return HealthReport(
+            time,
+            [
+                MonitorStatus(each.monitor, each.subject, int(each.level), each.statistic, each.threshold)
+                for each in notable
+            ],
+        )
+
+    def conditions(self) -> list[Condition]:
+        """The latest verdict of every monitor: the worst of its subjects, with all of them as values."""
+        by_monitor: dict[str, list[Verdict]] = {name: [] for name in MONITORS}
+        for verdict in self._health.verdicts() if self.parameters.enabled else ():
+            by_monitor[verdict.monitor].append(verdict)
+        return [_condition(name, verdicts) for name, verdicts in by_monitor.items()]
+
+
+def _condition(monitor: str, verdicts: list[Verdict]) -> Condition:
+    values = {each.subject or "statistic": f"{each.statistic:.6g} of {each.threshold:.6g}" for each in verdicts}
+    worst = max((each.level for each in verdicts), default=Level.OK)
+    subjects = [each.subject for each in verdicts if each.level is worst and each.subject]
+    words = {Level.OK: "well", Level.SUSPECT: "suspect", Level.FAILED: "failed"}[worst] if verdicts else "no verdict"
+    message = f"{words}: {', '.join(subjects)}" if subjects and worst is not Level.OK else words
+    return Condition(monitor, int(worst), message, values)
+
+
+def default_fault_table() -> str:
+    """Markdown table of the default fault table."""
+    subjects = {name: monitor.subjects(SupervisorParameters(ANY_ORBIT)) for name, monitor in MONITORS.items()}
+    return table_of(parse(DEFAULT, subjects, tuple(sensors()), AXES))
