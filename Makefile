@@ -9,7 +9,7 @@ in_environment := source ./env.sh &&
 pytest := python -m pytest --disable-plugin-autoload -p randomly -p timeout -p hypothesispytest --timeout 300
 shared := -p xdist -n auto --dist worksteal
 
-.PHONY: help setup demo test test-fast check bench verify fuzz lock clean force
+.PHONY: help setup demo test test-fast check bench verify fuzz wheel lock clean force
 
 help:
 	@echo "make demo        fly the default scenario on the node graph, and record it"
@@ -19,6 +19,7 @@ help:
 	@echo "make bench       measure speed, into build/bench.json"
 	@echo "make verify      long runs against independent programs, into docs/verification/"
 	@echo "make fuzz        hostile bytes and texts through all readers, a million of them"
+	@echo "make wheel       dist/formation_gnc-*.whl, for pip and without ROS"
 	@echo "make setup       the environment alone; then: source env.sh"
 	@echo "make lock        pin the newest versions that requirements*.in allow (takes uv)"
 	@echo "make clean       remove what was built; .venv and bags/ stay"
@@ -47,6 +48,9 @@ verify: .venv/.verify
 fuzz: setup
 	@$(in_environment) python -m tools.fuzz
 
+wheel: .venv/.ready
+	@tools/make_wheel.sh .venv/bin/python dist
+
 # Which ROS, and for which place: a change of either is a new environment.
 .ros: force
 	@ros=$$(tools/find_ros.sh) || exit; here="$$ros for $(CURDIR)"; [[ $$here == "$$(cat $@ 2>&1)" ]] || echo "$$here" > $@
@@ -72,4 +76,4 @@ lock:
 	$(lock) requirements-verify.in -c requirements.lock -o requirements-verify.lock
 
 clean:
-	rm -rf build install log .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf build dist install log .mypy_cache .pytest_cache .ruff_cache .hypothesis

@@ -49,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _replay(bag: Bag, output: Path, options: argparse.Namespace) -> bool:
     """Replay one run and compare; returns whether both are identical."""
-    from formation_gnc.transport.replay_recorder import replay_into
+    from formation_gnc.sil.replay_recorder import replay_into
 
     remarks = replay_into(bag, output, options.nodes.split(","), options.params)
     print(f"bag: {output}")
