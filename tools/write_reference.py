@@ -24,6 +24,7 @@ from formation_gnc.recording.parameters import RecorderParameters
 from formation_gnc.recording.player import ReplayParameters
 from formation_gnc.transport.markers import DisplayParameters
 from tools.architecture import FOUNDATION, PACKAGE, ROOT, WINGS, imports, place, wing
+from tools.command_reference import commands_page
 
 DOCS = ROOT / "docs"
 MESSAGES = ROOT / "msg_defs" / "msg"
@@ -263,6 +264,7 @@ TOPICS = DOCS / "reference" / "topics.md"
 
 PAGES: dict[Path, Callable[[], str]] = {
     DOCS / "reference" / "parameters.md": parameters_page,
+    DOCS / "reference" / "commands.md": commands_page,
     DOCS / "reference" / LAYOUT: lambda: foxglove_layout(["deputy1"]),
     TOPICS: lambda: filled(TOPICS, {"nodes": nodes_table(), "topics": topics_table()}),
     ARCHITECTURE: lambda: filled(ARCHITECTURE, {"wings": wings_diagram(), "tick": tick_diagram()}),
