@@ -41,7 +41,7 @@ def test_tests_named_in_documentation_exist(page: Path) -> None:
     assert named - there - {Path(source).stem for source in SOURCES} == set()
 
 
-BLOCK = re.compile(r"^( *)```(\w*)\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r"^( *)```(\w*)[^\n`]*\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
 INDENTED = re.compile(r"(?:^|\n\n)((?:    .*\n|\n)+)")
 COMMAND = re.compile(r"^\s*(?:\$ |\w+=\S+ )*(formation-gnc \w.*)", re.MULTILINE)
 MAKE = re.compile(r"^\s*(?:\$ )?make ([a-z][a-z-]*)", re.MULTILINE)
