@@ -81,7 +81,7 @@ def wheel() -> dict:
     shared = {f"{NAME}.share.{place.replace('/', '.')}": source for place, source in SHARED.items()}
     return {
         "package_dir": {package: folder for package, (folder, _) in shared.items()},
-        "package_data": {NAME: ["py.typed"], **{package: [pattern] for package, (_, pattern) in shared.items()}},
+        "package_data": DATA | {package: [pattern] for package, (_, pattern) in shared.items()},
         "packages": [*PACKAGES, *shared],
         "install_requires": REQUIREMENTS,
         "extras_require": {"notebook": ["pandas>=2.2,<4"], "testing": ["hypothesis", "pytest"]},
@@ -91,6 +91,7 @@ def wheel() -> dict:
     }
 
 
+DATA = {NAME: ["py.typed", "analysis/web/*"]}  # files of the package that are no modules
 COMMAND = f"formation-gnc = {NAME}.cli:main"
 PACKAGES = find_packages(include=[NAME, f"{NAME}.*"])
 IS_WHEEL = bool({"bdist_wheel", "dist_info"} & set(sys.argv))  # as pip builds one; colcon asks for neither
@@ -98,7 +99,7 @@ IS_WHEEL = bool({"bdist_wheel", "dist_info"} & set(sys.argv))  # as pip builds o
 setup(
     name=NAME,
     version="0.1.0",
-    **{"packages": PACKAGES, **(wheel() if IS_WHEEL else beside_ros())},
+    **{"packages": PACKAGES, "package_data": DATA, **(wheel() if IS_WHEEL else beside_ros())},
     python_requires=">=3.12",
     zip_safe=not IS_WHEEL,
     maintainer="formation_gnc maintainers",
