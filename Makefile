@@ -9,7 +9,7 @@ in_environment := source ./env.sh &&
 pytest := python -m pytest --disable-plugin-autoload -p randomly -p timeout -p hypothesispytest --timeout 300
 shared := -p xdist -n auto --dist worksteal
 
-.PHONY: help setup demo test test-fast check bench verify fuzz lock clean force
+.PHONY: help setup demo test test-fast check bench verify fuzz wheel docs lock clean force
 
 help:
 	@echo "make demo        fly the default scenario on the node graph, record it, and write its page"
@@ -19,6 +19,8 @@ help:
 	@echo "make bench       measure speed, into build/bench.json"
 	@echo "make verify      long runs against independent programs, into docs/verification/"
 	@echo "make fuzz        hostile bytes and texts through all readers, a million of them"
+	@echo "make wheel       dist/formation_gnc-*.whl, for pip and without ROS"
+	@echo "make docs        the documentation site, into build/site/"
 	@echo "make setup       the environment alone; then: source env.sh"
 	@echo "make lock        pin the newest versions that requirements*.in allow (takes uv)"
 	@echo "make clean       remove what was built; .venv and bags/ stay"
@@ -47,6 +49,14 @@ verify: .venv/.verify
 fuzz: setup
 	@$(in_environment) python -m tools.fuzz
 
+wheel: .venv/.ready
+	@tools/make_wheel.sh .venv/bin/python dist
+
+# Strict: a link or anchor that leads nowhere is an error.
+docs: .venv/.docs
+	@NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build
+	@echo "open build/site/index.html, or read it with: .venv/bin/mkdocs serve"
+
 # Which ROS, and for which place: a change of either is a new environment.
 .ros: force
 	@ros=$$(tools/find_ros.sh) || exit; here="$$ros for $(CURDIR)"; [[ $$here == "$$(cat $@ 2>&1)" ]] || echo "$$here" > $@
@@ -57,6 +67,10 @@ fuzz: setup
 
 .venv/.verify: install/.ready requirements-verify.lock
 	@.venv/bin/python -m pip install -qq --disable-pip-version-check --require-hashes --no-deps -r requirements-verify.lock
+	@touch $@
+
+.venv/.docs: .venv/.ready requirements-docs.lock
+	@.venv/bin/python -m pip install -qq --disable-pip-version-check --require-hashes --no-deps -r requirements-docs.lock
 	@touch $@
 
 # Python files are linked, not copied, so that a change to one needs no build; messages, data files and entry points do.
@@ -70,6 +84,7 @@ lock := uv pip compile --python-version 3.12 --only-binary :all: --no-binary emp
 lock:
 	$(lock) requirements.in -o requirements.lock
 	$(lock) requirements-verify.in -c requirements.lock -o requirements-verify.lock
+	$(lock) requirements-docs.in -c requirements.lock -o requirements-docs.lock
 
 clean:
-	rm -rf build install log .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf build dist install log .mypy_cache .pytest_cache .ruff_cache .hypothesis

@@ -11,10 +11,10 @@ import domain_coordinator
 
 from bench.floor import ROLES
 from bench.result import Result, interleaved
+from formation_gnc.recording.in_process_recorder import InProcessRecorder
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
-from formation_gnc.transport.in_process_recorder import InProcessRecorder
 from formation_gnc.transport.launcher import LaunchOptions, fly_graph
 
 TICKS = 6000

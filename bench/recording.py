@@ -14,12 +14,12 @@ from mcap.writer import CompressionType, Writer
 from mcap_ros2.decoder import DecoderFactory
 
 from bench.result import Result, interleaved
+from formation_gnc.recording.in_process_recorder import InProcessRecorder
 from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.topic_definition import TopicDefinition
 from formation_gnc.recording.writer import CHUNK_BYTES, BagWriter
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
-from formation_gnc.transport.in_process_recorder import InProcessRecorder
 from formation_gnc.types import NANOSECONDS
 
 TICKS = 2000

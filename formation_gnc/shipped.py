@@ -1,4 +1,7 @@
-"""Files that come with the package, by name: scenarios and campaigns, in the source tree or where it is installed."""
+"""Files that come with the package, by name: scenarios, campaigns and message definitions.
+
+They are in the source tree, in the package itself where a wheel brought it, or where colcon installed them.
+"""
 
 import os
 from collections.abc import Iterator
@@ -6,6 +9,13 @@ from pathlib import Path
 
 import formation_gnc
 from formation_gnc.errors import ConfigurationError
+
+MESSAGES = "formation_gnc_msgs"
+"""Package of the project's own message types."""
+
+_PACKAGE = Path(formation_gnc.__file__).resolve().parent
+_SOURCE = _PACKAGE.parent
+_WHEEL = _PACKAGE / "share"
 
 
 def find_shipped(name: str, kind: str, folder: str, form: str) -> Path:
@@ -25,7 +35,7 @@ def find_shipped(name: str, kind: str, folder: str, form: str) -> Path:
         if not path.is_file():
             raise ConfigurationError(f"{kind} {name}: no such file")
         return path
-    directories = list(_directories(folder))
+    directories = [_SOURCE / folder] if is_source_tree() else [share / "formation_gnc" / folder for share in _shares()]
     for directory in directories:
         if (directory / f"{name}.yaml").is_file():
             return directory / f"{name}.yaml"
@@ -33,12 +43,29 @@ def find_shipped(name: str, kind: str, folder: str, form: str) -> Path:
     raise ConfigurationError(f"{kind} {name}: unknown; it must be {form} or one of {', '.join(known)}")
 
 
-def _directories(folder: str) -> Iterator[Path]:
-    source = Path(formation_gnc.__file__).resolve().parents[1]
-    if (source / "package.xml").is_file():
-        yield source / folder
-        return
-    for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep):
-        directory = Path(prefix) / "share" / "formation_gnc" / folder
-        if directory.is_dir():
-            yield directory
+def find_message(package: str, name: str) -> Path | None:
+    """Path of a message definition; None where it is neither shipped nor installed.
+
+    Args:
+        package: such as "std_msgs".
+        name: such as "Header".
+    """
+    source = _SOURCE / "msg_defs"
+    of_source = [source if package == MESSAGES else source / "standard" / package] if is_source_tree() else []
+    for directory in [*of_source, *(share / package for share in _shares())]:
+        if (directory / "msg" / f"{name}.msg").is_file():
+            return directory / "msg" / f"{name}.msg"
+    return None
+
+
+def is_source_tree() -> bool:
+    """Whether the package is imported from its source tree, or by a link to it."""
+    return (_SOURCE / "package.xml").is_file()
+
+
+def _shares() -> Iterator[Path]:
+    """What a ROS prefix calls `share`: the wheel's, then those that are sourced."""
+    if _WHEEL.is_dir():
+        yield _WHEEL
+    for prefix in filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)):
+        yield Path(prefix) / "share"

@@ -29,7 +29,6 @@ ROS = re.compile(
 EXCEPTIONS = {
     ("formation_gnc.common", "formation_gnc.orbit.constants"): "the Earth's MU, for the chief's mean motion",
     ("formation_gnc.common", "formation_gnc.orbit.elements"): "the chief's orbit, as elements",
-    ("formation_gnc.recording.schema", "ament_index_python.packages"): "becomes an import where it is used",
 }
 """Imports, as (module, imported), that the rules forbid, each with its reason."""
 

@@ -8,9 +8,9 @@ import pytest
 
 from formation_gnc.bounds import violation
 from formation_gnc.errors import ConfigurationError
+from formation_gnc.messages.conversion import received, to_cdr
 from formation_gnc.mode_records import ModeState, Restriction
 from formation_gnc.records import Measurement, NavigationState, Reading, Record, SatelliteTruth, Target, Truth
-from formation_gnc.transport.conversion import received, to_cdr
 
 CHIEF = np.array([7e6, 0.0, 0.0, 0.0, 7.5e3, 0.0])
 STATE = np.array([100.0, 0.0, 0.0, 0.0, 0.2, 0.0])

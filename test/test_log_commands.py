@@ -14,14 +14,14 @@ from formation_gnc.analysis.compare import gnc_topics
 from formation_gnc.cli import main
 from formation_gnc.flight.graph import MODULES
 from formation_gnc.flight.topics import QUEUE_DEPTH
+from formation_gnc.messages.conversion import codec
 from formation_gnc.recording import Bag, identical, read
+from formation_gnc.recording.in_process_recorder import reader
 from formation_gnc.recording.topic_definition import TopicDefinition
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.records import EventKind, Timing
 from formation_gnc.sil.replay import nodes_of, parameters_of, replay
 from formation_gnc.sil.scenario import find_scenario, load_scenario
-from formation_gnc.transport.conversion import codec
-from formation_gnc.transport.in_process_recorder import reader
 from formation_gnc.types import NANOSECONDS
 
 pytestmark = pytest.mark.usefixtures("without_pictures")

@@ -16,7 +16,7 @@ pytest.importorskip("rclpy")
 
 def recorded(path: Path, change_at: int = -1, **navigation: Any) -> Path:
     """Ten minutes of the default scenario with every trouble that sensors have, as a bag."""
-    from formation_gnc.transport.in_process_recorder import InProcessRecorder
+    from formation_gnc.recording.in_process_recorder import InProcessRecorder
 
     trouble = {
         "deputy1.sensors.radius.dropout": 0.3,

@@ -20,8 +20,8 @@ import yaml
 
 import formation_gnc
 from formation_gnc import records
+from formation_gnc.messages.conversion import type_name
 from formation_gnc.sil.scenario import load_scenario
-from formation_gnc.transport.conversion import type_name
 
 ROOT = Path(__file__).resolve().parents[1]
 NODES = {"plant", "navigation", "guidance", "controller", "supervisor", "recorder"}

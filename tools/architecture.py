@@ -13,9 +13,9 @@ FOUNDATION = "foundation"
 WINGS = {
     "physics": ("orbit", "relative", "sensors", "plant"),
     "flight": ("flight", "navigation", "guidance", "control", "supervision"),
-    "data": ("recording", "interchange", "analysis"),
+    "data": ("messages", "recording", "interchange", "analysis"),
     "simulation": ("sil", "campaign", "testing"),
-    "shell": ("transport", "nodes", "commands", "cli"),
+    "shell": ("transport", "nodes", "commands", "cli", "api"),
 }
 """Folders and modules of each wing, from the bottom up; all other modules of the root are the foundation."""
 

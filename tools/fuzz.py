@@ -18,13 +18,13 @@ from formation_gnc.bounds import violation
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight.schedule import parse_schedule
 from formation_gnc.limited_yaml import load_limited
+from formation_gnc.messages.conversion import received, to_cdr, type_name
 from formation_gnc.parameters import read_yaml
 from formation_gnc.plant.faults.plan import plan_faults
 from formation_gnc.recording.decode import MessageType, installed_type
 from formation_gnc.records import Record
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
-from formation_gnc.transport.conversion import received, to_cdr, type_name
 from formation_gnc.transport.subscriptions import first_stamp
 
 LONGEST = 1.0

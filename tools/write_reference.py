@@ -27,6 +27,7 @@ from formation_gnc.supervision import registry as monitors
 from formation_gnc.supervision.supervisor import default_fault_table
 from formation_gnc.transport.markers import DisplayParameters
 from tools.architecture import FOUNDATION, PACKAGE, ROOT, WINGS, imports, place, wing
+from tools.command_reference import commands_page
 
 DOCS = ROOT / "docs"
 MESSAGES = ROOT / "msg_defs" / "msg"
@@ -271,6 +272,7 @@ SUPERVISION = DOCS / "theory" / "supervision.md"
 
 PAGES: dict[Path, Callable[[], str]] = {
     DOCS / "reference" / "parameters.md": parameters_page,
+    DOCS / "reference" / "commands.md": commands_page,
     DOCS / "reference" / LAYOUT: lambda: foxglove_layout(["deputy1"]),
     TOPICS: lambda: filled(TOPICS, {"nodes": nodes_table(), "topics": topics_table()}),
     ARCHITECTURE: lambda: filled(ARCHITECTURE, {"wings": wings_diagram(), "tick": tick_diagram()}),

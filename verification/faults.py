@@ -27,7 +27,7 @@ from verification.figure import Figure
 VICTIM = "deputy1"
 
 HARM, HELD, COAST, STEP = 20.0, 5.0, 86400.0, 60.0
-"""Error that counts as harm, and up to which the formation is kept, m; time of coasting after the flight, and step, s."""
+"""Harm and kept: errors from which and up to which, m; time of coasting after the flight, and its step, s."""
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from formation_gnc.common import CommonParameters
-from formation_gnc.control.controller import Command, Controller, Vehicle
-from formation_gnc.errors import DesignError
-from formation_gnc.parameters import parameter
-from formation_gnc.records import NavigationState, Target
+from formation_gnc.api import (
+    Command,
+    CommonParameters,
+    Controller,
+    DesignError,
+    NavigationState,
+    Target,
+    Vehicle,
+    parameter,
+)
 
 
 @dataclass(frozen=True)

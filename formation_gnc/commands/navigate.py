@@ -75,7 +75,7 @@ def _navigate(bag: "Bag", options: argparse.Namespace) -> dict[str, Comparison]:
     """Replay the navigation of a run; returns a comparison for each deputy that is asked for."""
     from formation_gnc.analysis.trajectory import deputies_of, has_messages
     from formation_gnc.recording.reader import Bag
-    from formation_gnc.transport.replay_recorder import replay_into
+    from formation_gnc.sil.replay_recorder import replay_into
 
     known = deputies_of(bag)
     if options.deputy is not None and options.deputy not in known:

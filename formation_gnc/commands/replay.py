@@ -54,7 +54,7 @@ def differences_of_replay(bag: Bag) -> list[Difference]:
     Raises:
         ConfigurationError: the recorded parameters cannot be flown.
     """
-    from formation_gnc.transport.replay_recorder import replay_into
+    from formation_gnc.sil.replay_recorder import replay_into
 
     with TemporaryDirectory(prefix="formation_gnc-") as directory:
         output = Path(directory) / "replay"
@@ -65,7 +65,7 @@ def differences_of_replay(bag: Bag) -> list[Difference]:
 
 def _replay(bag: Bag, output: Path, options: argparse.Namespace) -> bool:
     """Replay one run and compare; returns whether both are identical."""
-    from formation_gnc.transport.replay_recorder import replay_into
+    from formation_gnc.sil.replay_recorder import replay_into
 
     remarks = replay_into(bag, output, options.nodes.split(",") if options.nodes else None, options.params)
     print(f"bag: {output}")

@@ -6,6 +6,7 @@ run: ROS_DOMAIN_ID=N formation-gnc set deputy1/controller algorithm=mpc
 
 import argparse
 
+from formation_gnc.commands.ros import need_ros
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.sil.overrides import parse_value
 
@@ -24,6 +25,7 @@ def run(options: argparse.Namespace) -> int:
         if not (name and equals):
             raise ConfigurationError(f"set {entry!r}: is not allowed; it must be like algorithm=mpc")
         values[name] = parse_value(name, text)
+    need_ros()
     from formation_gnc.transport.parameter_client import set_parameters
 
     node = f"/{options.node.strip('/')}"

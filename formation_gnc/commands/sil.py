@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from formation_gnc.commands.ros import need_ros
 from formation_gnc.control.registry import ALGORITHMS
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.sil.overrides import overrides_of
@@ -190,6 +191,8 @@ def _fly_on_graph(
     scenario: Scenario, bag: Path, console: Console, composed: bool, display: bool, respawn: bool
 ) -> float:
     from formation_gnc.sil.report import Report
+
+    need_ros("--in-process flies without")
     from formation_gnc.transport.launcher import LaunchOptions, fly_graph
 
     Run(scenario)  # what cannot be flown is rejected before anything starts
@@ -204,34 +207,21 @@ def _fly_on_graph(
 
 
 def _fly_in_process(scenario: Scenario, bag: Path, console: Console) -> float:
-    from formation_gnc.parameters import to_json
-    from formation_gnc.recording.layout import LAYOUT, foxglove_layout
-    from formation_gnc.recording.provenance import parameters_record, provenance
-    from formation_gnc.recording.writer import BagWriter
-    from formation_gnc.transport.in_process_recorder import InProcessRecorder
+    from formation_gnc.sil.recorded_flight import fly as fly_in_process
 
-    run = Run(scenario)
-    tick, pace = scenario.plant.tick, scenario.plant.real_time_factor
-    if pace:
-        raise ConfigurationError("real_time_factor: has no effect in-process; fly the node graph for a paced run")
-    parameters = {
-        parameters_record(node): {name: to_json(value) for name, value in values.items()}
-        for node, values in scenario.parameters().items()
-    }
-    origin = {"run": {"scenario": scenario.name, "seed": str(scenario.plant.seed)}}
-    files = {f"{scenario.name}.yaml": scenario.text(), LAYOUT: foxglove_layout(scenario.plant.deputies)}
-    attachments = {name: text.encode() for name, text in files.items()}
-    with (
-        BagWriter(bag, provenance() | origin | parameters, attachments) as writer,
-        _Display(console, scenario.plant.ticks) as display,
-    ):
-        sink = InProcessRecorder(writer)
-        started = perf_counter()
-        while not run.plant.finished:
-            run.tick(sink)
-            if run.plant.tick % 500 == 0:
-                display.show("flying", run.plant.tick, run.plant.tick * tick / (perf_counter() - started))
-        return run.plant.tick * tick / (perf_counter() - started)
+    started = 0.0
+
+    def speedup(ticks: int) -> float:
+        return ticks * scenario.plant.tick / (perf_counter() - started)
+
+    def show(ticks: int) -> None:
+        nonlocal started
+        started = started or perf_counter()
+        display.show("flying", ticks, speedup(ticks))
+
+    with _Display(console, scenario.plant.ticks) as display:
+        fly_in_process(scenario, bag, show)
+        return speedup(scenario.plant.ticks)
 
 
 def _summarise(scenario: Scenario, bag: Path, speedup: float, options: argparse.Namespace) -> int:

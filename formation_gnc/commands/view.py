@@ -10,6 +10,7 @@ import signal
 from pathlib import Path
 
 from formation_gnc.commands.reading import print_remarks
+from formation_gnc.commands.ros import need_ros
 from formation_gnc.errors import ConfigurationError
 
 
@@ -38,8 +39,9 @@ def run(options: argparse.Namespace) -> int:
     except ImportError:
         raise ConfigurationError("foxglove-sdk is not installed: pip install foxglove-sdk") from None
     from formation_gnc.recording.reader import Bag
-    from formation_gnc.transport.viewer import show_graph
 
+    if not options.bag:
+        need_ros("--bag shows a recorded run without")
     player = None
     if options.bag:
         bags = Bag(options.bag).runs()
@@ -57,6 +59,8 @@ def run(options: argparse.Namespace) -> int:
         if player:
             player.play(lambda: bool(stopped))
         else:
+            from formation_gnc.transport.viewer import show_graph
+
             show_graph(view, lambda: bool(stopped))
     finally:
         view.close()

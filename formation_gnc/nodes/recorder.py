@@ -12,12 +12,12 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import Trigger
 
 from formation_gnc.flight import topics
+from formation_gnc.messages.conversion import codec
 from formation_gnc.recording.parameters import RecorderParameters
 from formation_gnc.recording.provenance import provenance
 from formation_gnc.recording.session import RecordingSession
 from formation_gnc.recording.writer import FLUSH_INTERVAL, BagWriter, Split
 from formation_gnc.records import Clock, Event
-from formation_gnc.transport.conversion import codec
 from formation_gnc.transport.diagnostics import PERIOD, DiagnosticsPublisher
 from formation_gnc.transport.node import ConfiguredNode
 from formation_gnc.transport.parameter_reader import ParameterReader

@@ -12,8 +12,8 @@ from formation_gnc.flight import topics
 from formation_gnc.flight.reception import Information
 from formation_gnc.recording.player import PlayedTick, ReplayParameters, TickPlayer
 from formation_gnc.records import Clock, Thrust
-from formation_gnc.transport.conversion import message_class
 from formation_gnc.transport.diagnostics import PERIOD, DiagnosticsPublisher
+from formation_gnc.transport.message_types import message_class
 from formation_gnc.transport.node import ConfiguredNode
 from formation_gnc.transport.process import run, stop_requested
 from formation_gnc.transport.qos import quality

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from rosbags.interfaces import Nodetype
 
-FieldDefinition = tuple[str, tuple[Nodetype, Any]]
-"""Name of a field and its type, as rosbags parses it."""
+from formation_gnc.messages.definitions import FieldDefinition
 
 _NUMPY = {
     "bool": "?",

@@ -10,7 +10,8 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
 
 from formation_gnc.errors import BagError
-from formation_gnc.recording.cdr_layout import CdrLayout, FieldDefinition, LayoutBuilder, MisfitError
+from formation_gnc.messages.definitions import FieldDefinition, schema_text
+from formation_gnc.recording.cdr_layout import CdrLayout, LayoutBuilder, MisfitError
 from formation_gnc.types import NANOSECONDS
 
 HEADER, TIME, CLOCK = "std_msgs/msg/Header", "builtin_interfaces/msg/Time", "rosgraph_msgs/msg/Clock"
@@ -134,13 +135,11 @@ class MessageType:
 
 
 def installed_type(name: str) -> MessageType:
-    """Message type as the installed message packages define it.
+    """Message type as it is shipped or installed.
 
     Raises:
-        BagError: it is not installed.
+        BagError: it is neither.
     """
-    from formation_gnc.recording.schema import schema_text
-
     return MessageType(name, schema_text(name).encode(), "ros2msg")
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import formation_gnc
 from formation_gnc.plugins import plugin_versions
 from formation_gnc.recording.arithmetic import ARITHMETIC, arithmetic
+from formation_gnc.shipped import is_source_tree
 
 LOST = "lost messages"
 """Name of the metadata record with the number of lost messages by topic."""
@@ -44,7 +45,9 @@ def provenance() -> dict[str, dict[str, str]]:
 
 
 def commit() -> str:
-    """Git commit of the source tree, with `-dirty` when it has changes; `unknown` outside a checkout."""
+    """Git commit of the source tree, with `-dirty` when it has changes; `unknown` outside a checkout of its own."""
+    if not is_source_tree():
+        return "unknown"
     source = Path(formation_gnc.__file__).resolve().parent
     command = ["git", "-C", str(source), "describe", "--always", "--abbrev=40", "--dirty"]
     try:

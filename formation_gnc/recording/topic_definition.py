@@ -9,7 +9,7 @@ from mcap.records import Channel, Schema
 
 from formation_gnc.errors import BagError
 from formation_gnc.limited_yaml import load_limited
-from formation_gnc.recording.schema import schema_text, type_hash
+from formation_gnc.messages.definitions import schema_text, type_hash
 
 _INFINITE = "{sec: 9223372036, nsec: 854775807}"
 _OFFERED_QOS = f"""\
@@ -51,14 +51,14 @@ class TopicDefinition:
 
     @classmethod
     def installed(cls, type_name: str, depth: int) -> Self:
-        """Definition from the installed message packages, offered reliable, transient-local, keep-last.
+        """Definition as it is shipped or installed, offered reliable, transient-local, keep-last.
 
         Args:
             type_name: such as "std_msgs/msg/Header".
             depth: of the publisher's queue.
 
         Raises:
-            BagError: the type is not installed, or the depth is not positive.
+            BagError: the type is neither shipped nor installed, or the depth is not positive.
         """
         if depth < 1:
             raise BagError(f"queue depth {depth} is not allowed; it must be at least 1")

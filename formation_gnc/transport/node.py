@@ -27,11 +27,12 @@ from formation_gnc.flight import topics
 from formation_gnc.flight.graph import PLANT
 from formation_gnc.flight.reception import Information, Reception
 from formation_gnc.flight.topics import QUEUE_DEPTH
+from formation_gnc.messages.conversion import codec, received
 from formation_gnc.parameters import OWN_OF_ROS, Leaf, change, dump, leaves, load, read_yaml
 from formation_gnc.records import WARNINGS, Event, EventKind
 from formation_gnc.sil.following import departures, values_of_plant, with_followed
-from formation_gnc.transport.conversion import codec, message_type, received
 from formation_gnc.transport.identified import identities, unsubscribe
+from formation_gnc.transport.message_types import message_type
 from formation_gnc.transport.parameter_arguments import given_parameters, without_parameters
 from formation_gnc.transport.process import stop_requested
 from formation_gnc.transport.qos import quality

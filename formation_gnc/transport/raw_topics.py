@@ -14,8 +14,8 @@ from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
 from formation_gnc.flight.reception import Information
 from formation_gnc.flight.sources import SourceLock, Verdict
-from formation_gnc.transport.conversion import message_class
 from formation_gnc.transport.identified import IdentifiedSubscription, identities
+from formation_gnc.transport.message_types import message_class
 from formation_gnc.transport.qos import quality
 from formation_gnc.transport.subscriptions import first_stamp
 

@@ -14,11 +14,11 @@ from formation_gnc.analysis.navigation_figures import (
     navigation_figures,
 )
 from formation_gnc.errors import BagError
+from formation_gnc.recording.in_process_recorder import InProcessRecorder
 from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
-from formation_gnc.transport.in_process_recorder import InProcessRecorder
 
 TROUBLE = {
     "deputy1.sensors.radius.dropout": 0.3,

@@ -16,11 +16,11 @@ from formation_gnc.analysis.panels.registry import DEPUTY_PANELS, FLEET_PANELS
 from formation_gnc.analysis.plot import TIME, Axis, Curve, Plot, Track
 from formation_gnc.analysis.report import Origin, write_report
 from formation_gnc.analysis.run_history import RunHistory
+from formation_gnc.recording.in_process_recorder import InProcessRecorder
 from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
-from formation_gnc.transport.in_process_recorder import InProcessRecorder
 
 
 def recorded(directory: Path, scenario: str) -> Bag:

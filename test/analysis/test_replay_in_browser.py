@@ -8,11 +8,11 @@ import pytest
 
 from formation_gnc.analysis.report import Origin, write_report
 from formation_gnc.analysis.run_history import RunHistory
+from formation_gnc.recording.in_process_recorder import InProcessRecorder
 from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
-from formation_gnc.transport.in_process_recorder import InProcessRecorder
 
 from .browser import CHROMIUM, Browser, in_browser
 

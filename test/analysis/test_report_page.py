@@ -13,11 +13,11 @@ from formation_gnc.analysis.run_history import RunHistory
 from formation_gnc.cli import main
 from formation_gnc.commands.sil import open_page
 from formation_gnc.recording.files import digest_of
+from formation_gnc.recording.in_process_recorder import InProcessRecorder
 from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
-from formation_gnc.transport.in_process_recorder import InProcessRecorder
 
 COAST = {"/**/controller": {"schedule": ["{at: 100.0, algorithm: coast}"]}}
 

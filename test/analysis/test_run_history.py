@@ -11,11 +11,11 @@ from formation_gnc.analysis.separation import minimum_separation
 from formation_gnc.analysis.thinning import POINTS, Thinned
 from formation_gnc.analysis.timeline import Mark
 from formation_gnc.analysis.trajectory import deputies_of, trajectories
+from formation_gnc.recording.in_process_recorder import InProcessRecorder
 from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
-from formation_gnc.transport.in_process_recorder import InProcessRecorder
 
 
 @pytest.fixture(scope="module")

@@ -11,11 +11,11 @@ from formation_gnc.analysis import scene
 from formation_gnc.analysis.run_history import RunHistory
 from formation_gnc.analysis.scene import scene_of
 from formation_gnc.orbit.constants import EARTH_RADIUS
+from formation_gnc.recording.in_process_recorder import InProcessRecorder
 from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
-from formation_gnc.transport.in_process_recorder import InProcessRecorder
 
 FLOAT32 = 1e-6
 """Relative error of a number in the page, with a margin: it is a float32, of 2^-24 at most."""

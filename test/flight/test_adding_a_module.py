@@ -12,15 +12,15 @@ from formation_gnc.flight.graph import MODULES, Input, Row, add_module
 from formation_gnc.flight.module import FlightModule, ModuleParameters
 from formation_gnc.flight.topics import Topic
 from formation_gnc.parameters import parameter, to_json
+from formation_gnc.recording.in_process_recorder import InProcessRecorder
 from formation_gnc.recording.layout import foxglove_layout
 from formation_gnc.recording.progress import RecordingProgress
 from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.records import Clock, Status, Thrust
+from formation_gnc.sil.replay_recorder import replay_into
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
-from formation_gnc.transport.in_process_recorder import InProcessRecorder
-from formation_gnc.transport.replay_recorder import replay_into
 
 TICKS = 20
 NODE = "/deputy1/burn_clock"

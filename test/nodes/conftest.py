@@ -18,11 +18,11 @@ from formation_gnc.nodes.display import DisplayNode
 from formation_gnc.nodes.plant import PlantNode
 from formation_gnc.nodes.recorder import RecorderNode
 from formation_gnc.nodes.replay import ReplayNode
+from formation_gnc.recording.in_process_recorder import InProcessRecorder
 from formation_gnc.recording.provenance import provenance
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import find_scenario, load_scenario
-from formation_gnc.transport.in_process_recorder import InProcessRecorder
 from formation_gnc.transport.module_node import ModuleNode
 from formation_gnc.transport.node import ConfiguredNode
 

@@ -15,6 +15,7 @@ from formation_gnc import records
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import GRAPH, Input, ModuleInstance, Row
+from formation_gnc.messages.conversion import codec, from_cdr, received, to_cdr, type_name
 from formation_gnc.recording.provenance import provenance
 from formation_gnc.recording.session import RecordingSession
 from formation_gnc.recording.writer import BagWriter
@@ -22,7 +23,7 @@ from formation_gnc.records import Event, Record
 from formation_gnc.sil.plant_executive import PlantExecutive
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import Scenario, load_scenario
-from formation_gnc.transport.conversion import codec, from_cdr, message_type, received, to_cdr, type_name
+from formation_gnc.transport.message_types import message_type
 
 WORDS = ["", "deputy1", "radius", "range_rate", "latitude", "lqr", "gate", "keep", "safe", "sensor"]
 NAMES = st.sampled_from([*WORDS, "ä\U0001f6f0", "x" * 300])

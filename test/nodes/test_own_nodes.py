@@ -8,10 +8,11 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSDurabilityPolicy, QoSProfile, QoSReliabilityPolicy, qos_profile_sensor_data
 
 from formation_gnc.flight import topics
+from formation_gnc.messages.conversion import from_cdr, to_cdr
 from formation_gnc.records import Estimate, Event, EventKind, Measurement, Thrust
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
-from formation_gnc.transport.conversion import from_cdr, message_type, to_cdr
+from formation_gnc.transport.message_types import message_type
 from formation_gnc.transport.node import ConfiguredNode
 
 from .conftest import Bench

@@ -14,12 +14,12 @@ from mcap.writer import Writer
 from formation_gnc.cli import main
 from formation_gnc.parameters import dump, to_json
 from formation_gnc.recording import Bag
+from formation_gnc.recording.in_process_recorder import InProcessRecorder
 from formation_gnc.recording.provenance import LOST, parameters_record
 from formation_gnc.recording.topic_definition import TopicDefinition
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
-from formation_gnc.transport.in_process_recorder import InProcessRecorder
 
 COMMANDS: dict[str, Callable[[Path, Path], list[str]]] = {
     "report": lambda bag, out: ["report", str(bag), "--output", str(out / "report.html")],

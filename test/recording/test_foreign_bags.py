@@ -19,9 +19,9 @@ from rosbags.rosbag2 import Writer as RosbagsWriter
 from rosbags.typesys import Stores, get_typestore
 
 from formation_gnc.errors import BagError
+from formation_gnc.messages.definitions import schema_text
 from formation_gnc.recording import Bag, identical
 from formation_gnc.recording.recover import PARTLY_LOST, WHOLE, recover
-from formation_gnc.recording.schema import schema_text
 
 RECEIVED = 1_764_000_000 * 10**9
 """Wall time (ns) at which a recorder of others begins to receive."""

@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 
 from formation_gnc.recording import Bag
+from formation_gnc.recording.in_process_recorder import InProcessRecorder
 from formation_gnc.recording.layout import foxglove_layout
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
-from formation_gnc.transport.in_process_recorder import InProcessRecorder
 
 
 @pytest.fixture(scope="module")

@@ -7,11 +7,11 @@ from types import SimpleNamespace
 import pytest
 from foxglove.websocket import PlaybackCommand
 
+from formation_gnc.messages.conversion import to_cdr
 from formation_gnc.recording import Bag
 from formation_gnc.recording.live_player import LivePlayer
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.records import Clock
-from formation_gnc.transport.conversion import to_cdr
 
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, math.nan, 100.0])

@@ -12,10 +12,10 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
 from formation_gnc.cli import main
+from formation_gnc.recording.in_process_recorder import InProcessRecorder
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
-from formation_gnc.transport.in_process_recorder import InProcessRecorder
 
 COMMANDS: dict[str, list[str]] = {
     "report": ["report", "BAG", "--output", "OUT/report.html"],

@@ -1,10 +1,10 @@
 from pathlib import Path
 
+from formation_gnc.messages.conversion import to_cdr
 from formation_gnc.recording import Bag
 from formation_gnc.recording.snapshot import Snapshot
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.records import Clock
-from formation_gnc.transport.conversion import to_cdr
 from formation_gnc.types import NANOSECONDS
 
 

@@ -12,9 +12,9 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 
 from formation_gnc.errors import ConfigurationError
+from formation_gnc.messages.definitions import type_hash
 from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.recover import NOTHING_SAVED, PARTLY_LOST, recover
-from formation_gnc.recording.schema import type_hash
 from formation_gnc.recording.writer import FLUSH_INTERVAL, BagWriter, Split
 
 

@@ -66,12 +66,12 @@ def fly(directory: str) -> dict[str, Any]:
     """Five minutes with the toy sensor every second tick, 20 s late, and outliers; what came of it."""
     from formation_gnc.analysis.report import Origin, write_report
     from formation_gnc.analysis.run_history import RunHistory
+    from formation_gnc.recording.in_process_recorder import InProcessRecorder
     from formation_gnc.recording.reader import Bag
     from formation_gnc.recording.writer import BagWriter
     from formation_gnc.records import Estimate, Measurement
     from formation_gnc.sil.runner import Run
     from formation_gnc.sil.scenario import load_scenario
-    from formation_gnc.transport.in_process_recorder import InProcessRecorder
     from tools.write_reference import parameters_page
 
     toy = "deputy1.sensors.relative_position"

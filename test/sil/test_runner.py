@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from formation_gnc.messages.conversion import to_cdr
 from formation_gnc.records import EventKind, ParameterChange
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
-from formation_gnc.transport.conversion import to_cdr
 from formation_gnc.types import NANOSECONDS
 
 Array = NDArray[np.float64]

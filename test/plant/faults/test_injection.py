@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import GRAPH
+from formation_gnc.messages.conversion import to_cdr
 from formation_gnc.parameters import load, parameter
 from formation_gnc.plant.faults.fault import Memory
 from formation_gnc.plant.faults.registry import FAULTS
@@ -20,7 +21,6 @@ from formation_gnc.plant.plant import Plant
 from formation_gnc.records import WARNINGS, EventKind
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
-from formation_gnc.transport.conversion import to_cdr
 
 from .conftest import COMMAND, VALUES, Flight, Fly
 from .test_plan import entries, text_of

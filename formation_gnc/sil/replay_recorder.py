@@ -7,12 +7,12 @@ from typing import Any
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import MODULES
 from formation_gnc.parameters import to_json
+from formation_gnc.recording.in_process_recorder import InProcessRecorder, reader
 from formation_gnc.recording.provenance import parameters_record, provenance
 from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.sil.replay import has_flown, nodes_of, parameters_of, replay
 from formation_gnc.sil.scenario import given_to
-from formation_gnc.transport.in_process_recorder import InProcessRecorder, reader
 
 
 def replay_into(bag: Bag, output: Path, modules: Sequence[str] | None, parameter_file: Path | None) -> list[str]:

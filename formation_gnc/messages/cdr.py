@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.transport.fields import Field, arguments, flatten, pack_times, reject_rows, reject_size, unpack_times
-from formation_gnc.transport.layout import LITTLE_ENDIAN, PackingLayout, UnpackingLayout
+from formation_gnc.messages.fields import Field, arguments, flatten, pack_times, reject_rows, reject_size, unpack_times
+from formation_gnc.messages.layout import LITTLE_ENDIAN, PackingLayout, UnpackingLayout
 
 PACKERS = 256
 """Layouts of one type of record kept for writing, one for all counts that its messages had."""

@@ -6,8 +6,9 @@ from typing import ClassVar
 from diagnostic_msgs.msg import KeyValue as KeyValueMessage
 from rclpy.serialization import deserialize_message, serialize_message
 
+from formation_gnc.messages.conversion import from_cdr, to_cdr, type_name
 from formation_gnc.records import Record
-from formation_gnc.transport.conversion import from_cdr, message_type, to_cdr, type_name
+from formation_gnc.transport.message_types import message_type
 
 # An installed message stands for a new file in msg_defs/msg: `string key`, `string value`.
 

@@ -17,8 +17,9 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 from formation_gnc import records
 from formation_gnc.errors import ConfigurationError
+from formation_gnc.messages.conversion import from_cdr, to_cdr
 from formation_gnc.recording.decode import installed_type
-from formation_gnc.transport.conversion import from_cdr, message_type, to_cdr
+from formation_gnc.transport.message_types import message_type
 from formation_gnc.transport.raw_topics import first_stamp
 from formation_gnc.types import NANOSECONDS
 

@@ -8,7 +8,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from formation_gnc.transport.layout import Layout
+from formation_gnc.messages.layout import Layout
 from formation_gnc.types import NANOSECONDS, Times, Vector
 
 TIME = np.dtype([("sec", "<i4"), ("nanosec", "<u4")])

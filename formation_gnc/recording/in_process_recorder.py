@@ -6,10 +6,10 @@ from typing import Any
 from formation_gnc import records
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
+from formation_gnc.messages.conversion import received, to_cdr, type_name
 from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.topic_definition import TopicDefinition
 from formation_gnc.recording.writer import BagWriter
-from formation_gnc.transport.conversion import received, to_cdr, type_name
 
 
 class InProcessRecorder:
