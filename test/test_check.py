@@ -44,7 +44,7 @@ def test_a_scenario_that_extends_another_holds_what_differs(write):
         for name, value in values.items()
         if value != base[node][name]
     }
-    nodes = ("/plant", "/deputy1/navigation", "/deputy1/guidance", "/deputy1/controller")
+    nodes = ("/plant", "/deputy1/navigation", "/deputy1/guidance", "/deputy1/controller", "/deputy1/supervisor")
     assert {key: value for key, value in changed.items() if key[1] == "tick"} == {
         (node, "tick"): 10.0 for node in nodes
     }

@@ -152,7 +152,7 @@ class TestRejections:
     @pytest.mark.parametrize(
         ("scenario", "words"),
         [
-            ("nowhere", "scenario nowhere: unknown; it must be a parameter file or one of canx_pco"),
+            ("nowhere", "scenario nowhere: unknown; it must be a parameter file or one of bad_day"),
             ("nowhere.yaml", "scenario nowhere.yaml: no such file"),
             ("/proc/self/mem", "/proc/self/mem: cannot be read (Input/output error)"),
         ],

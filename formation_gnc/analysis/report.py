@@ -19,6 +19,7 @@ from formation_gnc.analysis.run_history import RunHistory
 from formation_gnc.analysis.scene import scene_of
 from formation_gnc.analysis.timeline import Timeline
 from formation_gnc.flight import topics
+from formation_gnc.recording.files import digest_of
 from formation_gnc.recording.reader import Bag
 from formation_gnc.types import NANOSECONDS
 
@@ -41,7 +42,7 @@ class Origin:
     differences: Sequence[str] | None = None
 
 
-def write_report(bag: Bag, run: RunHistory, path: Path, title: str, origin: Origin) -> Path:
+def write_report(bag: Bag, run: RunHistory, path: Path, title: str, origin: Origin | None = None) -> Path:
     """Write the page; it needs no network and no server.
 
     Args:
@@ -49,11 +50,12 @@ def write_report(bag: Bag, run: RunHistory, path: Path, title: str, origin: Orig
         run: its history.
         path: file to write.
         title: of the page.
-        origin: what its badge tells.
+        origin: what its badge tells; by default where the bag is, not replayed.
 
     Returns:
         The path.
     """
+    origin = origin or Origin(str(bag.path), digest_of(bag.path))
     sections = [_badge(origin), _replay(run, bag)]
     tables = {"Summary": table(_summary(run, bag)), "Figures": _figure_table(bag)}
     told = "".join(f"<div><h2>{heading}</h2>{each}</div>" for heading, each in tables.items())

@@ -28,6 +28,7 @@ SOURCES = {
     "guidance": ("orbit", "guidance"),
     "sensors": ("orbit", "sensors"),
     "navigation/kernels": ("orbit", "sensors", "navigation/kernels"),
+    "supervision/kernels": ("orbit", "supervision/kernels"),
 }
 """Folders of the package with kernels, and those that kernels in them are built from."""
 

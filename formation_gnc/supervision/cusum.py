@@ -2,8 +2,9 @@
 
 from math import copysign, isfinite
 
-LARGEST = 5.0
-"""Samples are cut to so many standard deviations: one outlier alone raises no alarm."""
+LARGEST = 3.0
+"""Samples are cut to so many standard deviations, so that outliers to either side raise no alarm: at 5 % of all
+readings, a chance of 1e-3 in three orbits (with five deviations it would be 0.4)."""
 
 CEILING = 2.0
 """Largest sum, over the threshold, so that it comes down again when the fault is over."""

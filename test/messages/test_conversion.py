@@ -188,7 +188,7 @@ def test_text_that_is_not_utf8_is_marked_as_such() -> None:
 
 def test_text_without_its_zero_is_empty() -> None:
     """As some who write DDS have it."""
-    data = struct.pack("<2s2x6i", b"\0\1", 5, 6, 0, 0, 0, 100)
+    data = struct.pack("<2s2x7i", b"\0\1", 5, 6, 0, 0, 0, 100, 0)
     assert bits(from_cdr(records.Timing, data)) == bits(records.Timing(5_000_000_006, "", 100))
 
 

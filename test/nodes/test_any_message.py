@@ -49,9 +49,8 @@ def values(record_type: type[Record], name: str, hint: Any, field: dataclasses.F
     if get_origin(hint) is list:
         (element,) = get_args(hint)
         size = int(kind[kind.index("[") + 1 : -1]) if "[" in kind else None
-        of = (
-            any_record(element) if dataclasses.is_dataclass(element) else {float: DOUBLES, bool: st.booleans()}[element]
-        )
+        numbers = {float: DOUBLES, bool: st.booleans(), int: st.integers(0, 255)}
+        of = any_record(element) if dataclasses.is_dataclass(element) else numbers[element]
         return st.lists(of, min_size=size or 0, max_size=size or 4)
     return array(name, field, kind)
 

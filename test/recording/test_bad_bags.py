@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from mcap.reader import make_reader
 from mcap.writer import Writer
 
 from formation_gnc.cli import main
@@ -96,7 +97,11 @@ def bad(whole: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path
     (directory / "nothing.mcap").write_bytes(b"")
     (directory / "cut.mcap").write_bytes(content[: len(content) * 2 // 3])
     broken = bytearray(content)
-    broken[len(content) // 2 : len(content) // 2 + 40] = b"\xff" * 40
+    with mcap.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    middle = summary.chunk_indexes[0].chunk_start_offset + summary.chunk_indexes[0].chunk_length // 2
+    broken[middle : middle + 40] = b"\xff" * 40
     (directory / "broken.mcap").write_bytes(broken)
     BagWriter(directory / "silent", {}).close()
     return {

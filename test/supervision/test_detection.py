@@ -18,7 +18,7 @@ pytestmark = pytest.mark.thorough
 
 # Largest delays, in ticks. Readings come every 10 ticks, and the fault begins 5 ticks before one.
 FAULTS: dict[str, tuple[str, str, str, int]] = {
-    # 4 sigma: h = 10 at 1e-3 a flight, so four readings as long as the filter does not follow
+    # 4 sigma, of which three count: h = 10 at 1e-3 a flight, so five readings
     "radius off": ("fault: bias, sensor: radius, value: 20.0", "innovation_bias", "radius", 50),
     "radius scaled": ("fault: scale, sensor: radius, factor: 1.00001", "innovation_bias", "radius", 50),
     # 1 sigma after 100 s, and five readings at 2 sigma
@@ -36,7 +36,8 @@ FAULTS: dict[str, tuple[str, str, str, int]] = {
         "range_rate",
         700,
     ),
-    "sensors swapped": ("fault: swap, sensor: radius, other: latitude", "innovation_bias", "latitude", 30),
+    # five readings at the three deviations that count
+    "sensors swapped": ("fault: swap, sensor: radius, other: latitude", "innovation_bias", "latitude", 60),
     # a half to twice the limit at once, and from the first command on
     "thruster stuck on": ("fault: stuck_on, force: [0.1, 0.0, 0.0]", "thrust_response", "x", 5),
     "thrust reversed": ("fault: thrust_scale, factor: [-1.0, -1.0, -1.0]", "thrust_response", "*", 300),

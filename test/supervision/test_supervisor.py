@@ -217,7 +217,7 @@ def test_a_command_ends_what_has_no_return_where_the_fault_is_over() -> None:
     ]
 
 
-def test_a_separation_too_low_is_evaded_until_a_later_prediction_is_above_the_limit() -> None:
+def test_a_low_separation_is_evaded_until_a_prediction_is_above_it() -> None:
     module = supervisor(least_separation=20.0)
     modes = []
     for number in range(400):

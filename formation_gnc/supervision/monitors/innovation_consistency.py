@@ -3,11 +3,13 @@
 from collections import deque
 
 from formation_gnc.records import EstimateStatus, Rejection
-from formation_gnc.supervision.cusum import LARGEST
 from formation_gnc.supervision.monitor import Monitor, Observation, When
 from formation_gnc.supervision.thresholds import chi_square_limit, suspicion
 
 WINDOW = 60
+
+LARGEST = 5.0
+"""Standard deviations as which a larger one of a refused reading counts."""
 """Updates of a window: three times that of the filter, which inflates its covariance on its own."""
 
 

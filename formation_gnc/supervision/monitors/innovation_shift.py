@@ -14,10 +14,10 @@ class InnovationShift(Monitor):
     """Two-sided CUSUM of each value's normalised innovations, those that the gate refused included.
 
     Assumes: innovations of a healthy filter are white and normal with the predicted variance; no more readings than
-    ticks. An outlier counts as five standard deviations.
+    ticks. An outlier counts as three standard deviations.
     Cannot see: an error that the filter follows without contradiction, such as one along the unobservable direction;
     a shift below `reference`.
-    Delay: close to (h + 1.2) / (shift - k) readings, with the shift in standard deviations.
+    Delay: close to (h + 1.2) / (shift - k) readings, with the shift in standard deviations, of which three count.
     """
 
     reference: ClassVar[float]
