@@ -45,6 +45,8 @@ class FilterState:
     chief: ChiefTracker
     mass: float
     """Last plausible mass, kg."""
+    is_mass_known: bool
+    """Whether there was one."""
     history: StateHistory
     checks: ReadingChecks
     observability: Observability
@@ -60,12 +62,14 @@ def acquire(
     measurement: Measurement, parameters: NavigationParameters, design: Design, rejections: Rejections
 ) -> FilterState:
     """State of the filter from a measurement with a plausible acquisition fix."""
+    is_mass_known = is_plausible_mass(measurement.mass)
     variance = [parameters.fix_position_sigma**2, parameters.fix_velocity_sigma**2]
     return FilterState(
         filter=FILTERS[parameters.filter](np.array(measurement.fix), np.diag(np.repeat(variance, 3))),
         time=measurement.time,
         chief=ChiefTracker(measurement.chief_state),
-        mass=measurement.mass if is_plausible_mass(measurement.mass) else 1.0,
+        mass=measurement.mass if is_mass_known else 1.0,
+        is_mass_known=is_mass_known,
         history=StateHistory(parameters.latest_ticks),
         checks=ReadingChecks(rejections),
         observability=expected_observability(measurement.chief_state, measurement.fix, parameters, design),

@@ -28,6 +28,9 @@ LARGEST_ACCELERATION = 100.0
 LEAST_MASS = 1e-6
 """Below any satellite, kg."""
 
+MASS_STEP = 0.1
+"""Beyond what any thruster uses between two measurements, over the mass."""
+
 
 class Rejections:
     """Counts of rejections since the start of the run, and reports of them for events."""
@@ -174,9 +177,9 @@ def is_plausible_chief(chief: Vector) -> bool:
     return EARTH_RADIUS**2 < square < LARGEST_RADIUS**2 and across and speed < LARGEST_SPEED**2
 
 
-def is_plausible_mass(mass: float) -> bool:
-    """Whether a mass (kg) can be a satellite's."""
-    return isfinite(mass) and mass > LEAST_MASS
+def is_plausible_mass(mass: float, before: float | None = None) -> bool:
+    """Whether a mass (kg) can be a satellite's, after the one before."""
+    return isfinite(mass) and mass > LEAST_MASS and (before is None or abs(mass - before) <= MASS_STEP * before)
 
 
 def is_plausible_acceleration(x: float, y: float, z: float) -> bool:

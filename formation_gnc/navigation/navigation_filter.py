@@ -252,8 +252,8 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
 
     def _acceleration(self, state: FilterState, measurement: Measurement) -> Vector:
         """Acceleration by thrust over the tick that has ended; zero where it is not plausible."""
-        if is_plausible_mass(measurement.mass):
-            state.mass = measurement.mass
+        if is_plausible_mass(measurement.mass, state.mass if state.is_mass_known else None):
+            state.mass, state.is_mass_known = measurement.mass, True
         else:
             self._rejections.add(Rejection.AVIONICS, "mass")
         x, y, z = measurement.applied_force.tolist()

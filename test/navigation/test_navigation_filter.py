@@ -417,6 +417,8 @@ def test_an_ephemeris_that_resumes_elsewhere_is_accepted() -> None:
         (lambda m: replace(m, applied_force=np.full(3, np.nan)), Rejection.AVIONICS),
         (lambda m: replace(m, mass=np.nan), Rejection.AVIONICS),
         (lambda m: replace(m, mass=0.0), Rejection.AVIONICS),
+        (lambda m: replace(m, mass=10.0 * m.mass), Rejection.AVIONICS),
+        (lambda m: replace(m, mass=0.01 * m.mass), Rejection.AVIONICS),
         (lambda m: replace(m, chief_state=m.chief_state * np.nan), Rejection.CHIEF),
         (lambda m: replace(m, fix_available=True, fix=m.fix * np.nan), Rejection.FIX),
     ],
