@@ -1,7 +1,7 @@
 """Synchronization of several topics by stamp, never by order of arrival."""
 
 from collections import OrderedDict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -56,6 +56,8 @@ class StampSynchronizer:
         """Optional topics that have a record of the current tick where they do not miss it."""
         self._absent = _NONE
         """Those of them that have none."""
+        self._forgone = _NONE
+        """Topics that nobody publishes."""
         self._current: int | None = None
         """Latest stamp of the pacing topic, ns."""
         self._completed: int | None = None
@@ -83,6 +85,17 @@ class StampSynchronizer:
         received[time] = record
         if len(received) > HISTORY:
             received.popitem(last=False)
+        self._forgone -= {topic}
+        return self._complete()
+
+    def forgo(self, topics: Collection[str]) -> Sequence[Any] | None:
+        """Do without dispensable topics until they are heard; returns as `take`, for the current stamp."""
+        self._forgone |= frozenset(topics)
+        self._missing |= frozenset(each for each in topics if not self._received[each])
+        return self._complete()
+
+    def _complete(self) -> Sequence[Any] | None:
+        """The records of the current stamp, once, when all are there."""
         current = self._current
         if current is None or current == self._completed:
             return None
@@ -151,8 +164,8 @@ class StampSynchronizer:
                 self._awaited += topics.delayed
             else:
                 self._missing |= frozenset(topics.delayed)
-        if topics.without:
-            self._missing |= topics.without
+        if topics.without or self._forgone:
+            self._missing |= topics.without | self._forgone
 
     def _clear_after(self, time: int) -> None:
         """Drop the records that topics have left from a run that had come further than a time (ns)."""

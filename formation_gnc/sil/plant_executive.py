@@ -6,7 +6,7 @@ from typing import Any, Protocol
 from formation_gnc.errors import RecorderLostError
 from formation_gnc.flight import topics
 from formation_gnc.flight.barrier import Decision
-from formation_gnc.flight.graph import COMMAND, GRAPH
+from formation_gnc.flight.graph import COMMAND, GRAPH, commanding
 from formation_gnc.flight.sources import is_shared, names_of, shared
 from formation_gnc.plant.parameters import PlantParameters
 from formation_gnc.records import Thrust
@@ -26,6 +26,9 @@ CONTRADICTIONS = 3
 
 NAMED = 3
 """Topics without a publisher that are named."""
+
+COMPANY = 60.0
+"""Wall time (s) for which modules are awaited without which there would be commands too, such as the supervisor."""
 
 LINGERING = 30.0
 """Wall time (s) after which DDS has forgotten a node that was killed: two of one name for longer are two."""
@@ -74,6 +77,10 @@ class PlantExecutive:
         self._troubles: dict[str, None] = {}
         self._recorder_is_missed = False
         self._shared_since: dict[str, float] = {}
+        self._needed = frozenset(row.answer.of(deputy) for deputy in deputies for row in commanding())
+        """Answers without which there is no command."""
+        self._alone_since = 0.0
+        """Since when all of these have a publisher, s."""
 
     @property
     def finished(self) -> bool:
@@ -149,7 +156,7 @@ class PlantExecutive:
                 raise RecorderLostError(f"{text}; {self.simulation.plant.tick} ticks flown")
 
     def _begin_if_all_are_there(self, now: float) -> None:
-        missing = ", ".join(self._missing())
+        missing = ", ".join(self._missing(now))
         self._say(f"waiting for {missing}" if missing else "flying")
         if missing:
             self._report(self._said, now)
@@ -181,9 +188,11 @@ class PlantExecutive:
     def _absent(self) -> list[str]:
         return [topic for topic, _ in self.simulation.answers() if not self._around.publishers_of(topic)]
 
-    def _missing(self) -> Iterator[str]:
+    def _missing(self, now: float) -> Iterator[str]:
         absent = self._absent()
-        if absent:
+        if not absent or self._needed.intersection(absent):
+            self._alone_since = now
+        if absent and now - self._alone_since < COMPANY:
             modules = dict(self.simulation.answers())
             named = ", ".join(f"{topic} ({modules[topic]})" for topic in absent[:NAMED])
             yield f"a publisher of {named}" + (f" and {len(absent) - NAMED} more" if len(absent) > NAMED else "")

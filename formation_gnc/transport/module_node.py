@@ -1,6 +1,6 @@
 """The node of a flight module, whichever: its place in the graph is read from the graph table."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from threading import BoundedSemaphore
@@ -28,6 +28,9 @@ SOON = 1_000_000
 
 DESIGNS = 8
 """Requests to change parameters that may wait for their designs; more are rejected."""
+
+ALONE = 1.0
+"""Wall time (s) for which a dispensable input is awaited that no node is known to publish."""
 
 LATE = 50_000_000
 """Wall time (ns) after which a message that is received counts as one of several that wait."""
@@ -63,6 +66,8 @@ class ModuleNode(ConfiguredNode):
         self._waiting: dict[str, list[tuple[int, Any]]] = {}
         self._catch_up_soon = self.create_wall_timer(SETTLING, self._catch_up)
         self._catch_up_soon.cancel()
+        self._forgo_soon = self.create_wall_timer(ALONE, self._forgo)
+        self._forgo_soon.cancel()
         if bus is None:
             self.subscribe_inputs()
         self._answered, self._warning = 0, ""
@@ -127,11 +132,27 @@ class ModuleNode(ConfiguredNode):
             self._take(topic, record)
 
     def _take(self, topic: str, record: Any) -> None:
-        """Answer the tick when the last input of its stamp is there; the outputs go first, others wait for them."""
-        started = perf_counter()
+        """Answer the tick when the last input of its stamp is there."""
         inputs = self._instance.synchronizer.take(topic, record)
-        if inputs is None:
+        if inputs is not None:
+            self._answer(inputs)
+        elif topic == self._instance.needed[0] and self._instance.delayed:
+            self._forgo_soon.reset()
+
+    def _forgo(self) -> None:
+        """Go on without what nobody publishes, such as a mode where there is no supervisor."""
+        self._forgo_soon.cancel()
+        synchronizer = self._instance.synchronizer
+        if synchronizer.unanswered is None:
             return
+        silent = [topic for topic in self._instance.delayed if not self.identities_on(topic)]
+        inputs = synchronizer.forgo(silent) if silent else None
+        if inputs is not None:
+            self._answer(inputs)
+
+    def _answer(self, inputs: Sequence[Any]) -> None:
+        """Publish the answer to a tick; the outputs go first, others wait for them."""
+        started = perf_counter()
         for name, output in self._instance.respond(inputs):
             self._publish[name](output)
         self._answered += 1

@@ -60,7 +60,7 @@ def test_a_recorder_of_another_name_and_a_controller_of_another_name_count(bench
     there, of_deputy = ["-r", "__ns:=/omega"], ["-r", "__ns:=/omega/deputy1"]
     nodes = [bench.make("plant", *there, *run), bench.make("recorder", *there, "-r", "__node:=tape")]
     nodes += [bench.make("controller", *of_deputy, "-r", "__node:=autopilot")]
-    nodes += [bench.make(name, *of_deputy) for name in ("guidance", "navigation")]
+    nodes += [bench.make(name, *of_deputy) for name in ("guidance", "navigation", "supervisor")]
     fly(bench, nodes)
     (bag,) = recorded(nodes)
     assert bag.topics["/deputy1/thrust"].count == TICKS

@@ -103,7 +103,7 @@ def test_navigation_without_a_fix_says_what_it_waits_for(bench: Bench, measureme
 @pytest.mark.parametrize("profile", PROFILES)
 def test_the_plant_hears_commands_of_any_quality_of_service(bench: Bench, profile: str) -> None:
     node = bench.make("plant", "-p", "deadline:=600.0")
-    for row in ("estimate", "target"):
+    for row in ("estimate", "target", "mode"):
         record = next(each.record for each in topics.DEPUTY_TOPICS if each.name == row)
         bench.user.create_publisher(message_type(record), f"/deputy1/{row}", 10)
     publisher = bench.user.create_publisher(message_type(Thrust), topics.THRUST.of("deputy1"), PROFILES[profile])
