@@ -19,7 +19,7 @@ from formation_gnc.control.registry import ALGORITHMS
 from formation_gnc.recording import Bag, identical
 from formation_gnc.records import EventKind
 
-from .conftest import GNC_TOPICS, PARTS, PATIENCE, Desk, Sil, set_parameter, wait_until
+from .conftest import GNC_TOPICS, PARTS, PATIENCE, Desk, Sil, has_messages, set_parameter, wait_until
 
 pytestmark = pytest.mark.sil
 
@@ -247,7 +247,7 @@ def test_a_node_that_dies_ends_the_run_and_is_named(sil: StartSil, victim: str) 
 
 def test_a_node_that_dies_is_started_again_where_asked(sil: StartSil) -> None:
     run = sil("--respawn", "--real-time-factor", "20", "--duration", "300")
-    run.wait_for_flight()
+    wait_until(lambda: has_messages(run.bag, "/deputy1/target"), "the first target on disk")
     os.kill(run.children()["guidance"], signal.SIGKILL)
     status, _, errors = run.finish()
     assert status == 0, errors
