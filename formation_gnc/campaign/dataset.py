@@ -24,13 +24,11 @@ from pyarrow.dataset import dataset, field
 from formation_gnc.campaign.case import CASE, VARIANT
 from formation_gnc.campaign.definition import Campaign, load_campaign
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.types import Matrix
+from formation_gnc.types import AXES, Matrix
 
 CASES, ERRORS, TIMING = "cases", "errors", "timing"
 
 MANIFEST = "campaign.json"
-
-AXES = ("x", "y", "z")
 
 _PART = re.compile(r"part-(\d+)-(\d+)\.parquet")
 

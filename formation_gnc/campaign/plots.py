@@ -7,11 +7,11 @@ import numpy as np
 
 from formation_gnc.analysis.plot import AXIS_COLOURS, COLOURS, GREY, HILL_AXES, RED, TIME, Axis, Curve, Plot, Style
 from formation_gnc.campaign.case import nominal_scenario
-from formation_gnc.campaign.dataset import AXES, ERRORS
+from formation_gnc.campaign.dataset import ERRORS
 from formation_gnc.campaign.evaluation import Correlation, Flights
 from formation_gnc.campaign.flight_figures import curve_ticks
 from formation_gnc.campaign.requirement import Requirement
-from formation_gnc.types import Vector
+from formation_gnc.types import AXES, Vector
 
 CONFIDENCE = 0.95
 """Of the band about a distribution (Dvoretzky, Kiefer, Wolfowitz; Massart)."""

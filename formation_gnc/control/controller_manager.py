@@ -16,9 +16,7 @@ from formation_gnc.flight.module import Configuration, FlightModule, ModuleParam
 from formation_gnc.mode_records import ModeState, RestrictionKind
 from formation_gnc.parameters import change, parameter, per_entry
 from formation_gnc.records import EventKind, NavigationState, Status, Target, Thrust
-
-AXES = ("x", "y", "z")
-"""Hill axes, as restrictions name them."""
+from formation_gnc.types import AXES
 
 
 @dataclass(frozen=True)

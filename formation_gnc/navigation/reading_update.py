@@ -63,11 +63,11 @@ def update(
         ArithmeticError: the result is not finite.
     """
     within, innovations = _gated(state, readings, gate, rejections, isolated)
-    offered = sum(
-        rows.stop - rows.start
-        for name, rows in zip(readings.model.sensors, readings.model.rows, strict=True)
-        if name not in isolated
-    )
+    offered, model = readings.model.size, readings.model
+    if isolated:
+        offered -= sum(
+            rows.stop - rows.start for name, rows in zip(model.sensors, model.rows, strict=True) if name in isolated
+        )
     if within is None:
         return UpdateResult(innovations, 0.0, 0, offered)
     readings = within.readings

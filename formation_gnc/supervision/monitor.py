@@ -13,9 +13,6 @@ from formation_gnc.supervision.parameters import SupervisorParameters
 from formation_gnc.supervision.reckoning import Reckoning
 from formation_gnc.supervision.thrust_tally import ThrustTally
 
-AXES = ("x", "y", "z")
-"""Hill axes, as subjects."""
-
 
 class Level(IntEnum):
     """How bad it is."""

@@ -11,10 +11,9 @@ from formation_gnc.errors import ConfigurationError, ImpactError
 from formation_gnc.mode_records import NO_FORCE, Mode
 from formation_gnc.records import Estimate
 from formation_gnc.supervision.coasting import Burn, Forecast, Outcome
-from formation_gnc.supervision.monitor import AXES
 from formation_gnc.supervision.parameters import SupervisorParameters
 from formation_gnc.supervision.passive_safety import elements, manoeuvre, safe_orbits
-from formation_gnc.types import NANOSECONDS, Matrix, Vector
+from formation_gnc.types import AXES, NANOSECONDS, Matrix, Vector
 
 RISK = 1e-3
 """Probability of coming closer than the limit, up to which coasting is safe."""

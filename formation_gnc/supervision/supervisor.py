@@ -31,11 +31,12 @@ from formation_gnc.sensors.registry import sensors
 from formation_gnc.supervision.fault_table import DEFAULT, Entry, Response, parse, table_of
 from formation_gnc.supervision.health import Health
 from formation_gnc.supervision.modes import COMMANDS, FAULTS, Step, Trigger, refusal, step
-from formation_gnc.supervision.monitor import AXES, Level, Verdict
+from formation_gnc.supervision.monitor import Level, Verdict
 from formation_gnc.supervision.parameters import SupervisorParameters
 from formation_gnc.supervision.registry import MONITORS
 from formation_gnc.supervision.responses import ActiveResponse, FaultResponses
 from formation_gnc.supervision.safe import Evasion, plan_evasion
+from formation_gnc.types import AXES
 
 LEFT = 1.5
 """Control error, over the tube, beyond which the target counts as left."""

@@ -38,6 +38,11 @@ class NodeProcess:
     respawns: int = 0
     """Times that it may be started again."""
 
+    @property
+    def has_died(self) -> bool:
+        """Whether it has ended with an error."""
+        return self.process.poll() not in (None, 0)
+
     def reason(self) -> str:
         """Why it ended, in words, with the last line of its log."""
         code = self.process.returncode
@@ -92,15 +97,16 @@ class Graph:
     def check(self) -> None:
         """Raise NodeDied if a node has ended with an error, and is not to be started again."""
         for node in self.nodes:
-            if node.process.poll() not in (None, 0) and not node.respawns:
+            if node.has_died and not node.respawns:
                 raise NodeDied(f"{node.name} ended: {node.reason()}")
 
     def respawn(self) -> Iterator[str]:
         """Start again what has ended with an error and may be; what ended and why, in words."""
-        for node in [each for each in self.nodes if each.respawns and each.process.poll() not in (None, 0)]:
+        for node in [each for each in self.nodes if each.respawns and each.has_died]:
+            words = f"{node.name} ended: {node.reason()}; started again"  # before the next one writes to the log
             self.nodes.remove(node)
             self.start(node.name, node.arguments, node.respawns - 1)
-            yield f"{node.name} ended: {node.reason()}; started again"
+            yield words
 
     def stop(self) -> None:
         """Stop every node, the recorder last, after its queues are drained; kill what does not stop."""

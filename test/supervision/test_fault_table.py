@@ -8,10 +8,10 @@ from formation_gnc.common import Orbit
 from formation_gnc.errors import ParameterError
 from formation_gnc.supervision.fault_table import DEFAULT, Response, parse
 from formation_gnc.supervision.modes import FAULTS, TRANSITIONS, Mode
-from formation_gnc.supervision.monitor import AXES
 from formation_gnc.supervision.parameters import SupervisorParameters
 from formation_gnc.supervision.registry import MONITORS
 from formation_gnc.supervision.responses import FaultResponses
+from formation_gnc.types import AXES
 
 SENSORS = ("radius", "range_rate", "latitude")
 SUBJECTS = {name: SENSORS if "innovation_b" in name or "frozen" in name else ("",) for name in MONITORS} | {

@@ -1,12 +1,13 @@
 """Every figure of ours on the page of the seeds, held to the one that was accepted last."""
 
 import csv
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from verification.figure import Cell
+from verification.figure import Cell, Figure
 from verification.seeds.cases import STATES, Array, in_joshis_order
 
 ACCEPTED = Path(__file__).with_name("accepted.csv")
@@ -42,6 +43,16 @@ class Ours:
             self(f"{name}: {label}", value, ".3g", unit, margin)
             for label, value, unit, margin in zip(STATES, values, units, margins, strict=True)
         ]
+
+
+def joined(directory: Path, *parts: Callable[[Path, Ours], tuple[str, list[Figure]]]) -> tuple[str, list[Figure]]:
+    """Parts of a page one after the other, with their figures and those of ours."""
+    ours, texts, figures = Ours(), list[str](), list[Figure]()
+    for part in parts:
+        text, more = part(directory, ours)
+        texts.append(text)
+        figures += more
+    return "\n".join(texts), [*figures, *ours.cells]
 
 
 @cache

@@ -21,7 +21,7 @@ from formation_gnc.relative.model import RelativeModel
 from formation_gnc.relative.oblate import OblateModel
 from verification.coverage.marker import covers
 from verification.figure import Figure
-from verification.seeds.accepted import Ours
+from verification.seeds.accepted import Ours, joined
 from verification.seeds.cases import (
     MU,
     SEMI_MAJOR_AXIS,
@@ -486,9 +486,4 @@ def to_go(plant: RelativeModel, factorisation: str, goal: Orbit, final: int) -> 
 
 def section(directory: Path) -> tuple[str, list[Figure]]:
     """Tables 4.3, 5.3, 5.4 and 5.6."""
-    texts, figures, ours = [], list[Figure](), Ours()
-    for part in (lqr, sdre_infinite, sdre_forms, finite):
-        text, claims = part(directory, ours)
-        texts.append(text)
-        figures += claims
-    return "\n".join(texts), [*figures, *ours.cells]
+    return joined(directory, lqr, sdre_infinite, sdre_forms, finite)

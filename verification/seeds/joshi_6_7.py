@@ -19,7 +19,7 @@ from formation_gnc.relative.nonlinear import NonlinearModel
 from formation_gnc.relative.oblate import OblateModel
 from verification.coverage.marker import covers
 from verification.figure import Figure, save
-from verification.seeds.accepted import Ours
+from verification.seeds.accepted import Ours, joined
 from verification.seeds.cases import (
     KM,
     MU,
@@ -503,9 +503,4 @@ def integral(plan: StaticPlan) -> float:
 
 def section(directory: Path) -> tuple[str, list[Figure]]:
     """Tables 6.3, 6.4, 6.5, 6.7 and 7.3, and the comparison with the optimum."""
-    texts, figures, ours = [], list[Figure](), Ours()
-    for part in (table_6_3, tables, convergence):
-        text, claims = part(directory, ours)
-        texts.append(text)
-        figures += claims
-    return "\n".join(texts), [*figures, *ours.cells]
+    return joined(directory, table_6_3, tables, convergence)

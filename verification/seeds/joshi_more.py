@@ -14,7 +14,7 @@ from formation_gnc.relative.hill import HillModel
 from formation_gnc.relative.model import RelativeModel
 from verification.coverage.marker import covers
 from verification.figure import Figure, save
-from verification.seeds.accepted import Ours
+from verification.seeds.accepted import Ours, joined
 from verification.seeds.cases import KM, MU, SEMI_MAJOR_AXIS, Orbit, effort, fly, model
 from verification.seeds.joshi_4_5 import GAIN, goals_of, sdre_thrust, to_go
 from verification.seeds.joshi_6_7 import FINAL, NEAR, TIGHT, WIDE, task_of
@@ -29,12 +29,7 @@ PLANES = (("x", "y", 0, 1), ("x", "z", 0, 2), ("y", "z", 1, 2))
 
 def section(directory: Path) -> tuple[str, list[Figure]]:
     """All parts."""
-    ours, texts, figures = Ours(), list[str](), list[Figure]()
-    for part in (planes, circular, all_constants, bound):
-        text, more = part(directory, ours)
-        texts.append(text)
-        figures += more
-    return "\n".join(texts), [*figures, *ours.cells]
+    return joined(directory, planes, circular, all_constants, bound)
 
 
 covers(

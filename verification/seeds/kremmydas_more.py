@@ -25,7 +25,7 @@ from formation_gnc.types import NANOSECONDS
 from verification.acquisitions import ACQUISITIONS, FIXED, LIMIT, MASS, PRINTED, Flight, fly, scenario
 from verification.coverage.marker import covers
 from verification.figure import Figure, save
-from verification.seeds.accepted import Ours
+from verification.seeds.accepted import Ours, joined
 
 PAGE = "kremmydas"
 
@@ -115,12 +115,7 @@ covers(
 
 def section(directory: Path) -> tuple[str, list[Figure]]:
     """All parts."""
-    ours, texts, figures = Ours(), list[str](), list[Figure]()
-    for part in (types, polynomials, freedoms, held, crossed, acquisition):
-        text, more = part(directory, ours)
-        texts.append(text)
-        figures += more
-    return "\n".join(texts), [*figures, *ours.cells]
+    return joined(directory, types, polynomials, freedoms, held, crossed, acquisition)
 
 
 def types(directory: Path, ours: Ours) -> tuple[str, list[Figure]]:

@@ -11,7 +11,7 @@ from formation_gnc.control.fixed_endpoint_lq import Cost, approximating_sequence
 from formation_gnc.orbit.constants import MU
 from verification.coverage.marker import covers
 from verification.figure import Figure, save
-from verification.seeds.accepted import Ours
+from verification.seeds.accepted import Ours, joined
 from verification.seeds.owis import (
     CIRCULAR,
     FILLS,
@@ -72,12 +72,7 @@ covers(
 
 def section(directory: Path) -> tuple[str, list[Figure]]:
     """All four."""
-    ours, texts, figures = Ours(), list[str](), list[Figure]()
-    for part in (controllability, soft, perturbed, constellation):
-        text, more = part(directory, ours)
-        texts.append(text)
-        figures += more
-    return "\n".join(texts), [*figures, *ours.cells]
+    return joined(directory, controllability, soft, perturbed, constellation)
 
 
 def controllability(_: Path, ours: Ours) -> tuple[str, list[Figure]]:

@@ -25,7 +25,7 @@ from formation_gnc.types import NANOSECONDS
 from verification.control import ROBERTS
 from verification.coverage.marker import covers
 from verification.figure import Figure, save
-from verification.seeds.accepted import Ours
+from verification.seeds.accepted import Ours, joined
 
 PAGE = "roberts"
 
@@ -71,12 +71,7 @@ covers(
 
 def section(directory: Path) -> tuple[str, list[Figure]]:
     """All parts."""
-    ours, texts, figures = Ours(), list[str](), list[Figure]()
-    for part in (design_study, separations, manoeuvre):
-        text, more = part(directory, ours)
-        texts.append(text)
-        figures += more
-    return "\n".join(texts), [*figures, *ours.cells]
+    return joined(directory, design_study, separations, manoeuvre)
 
 
 def design_study(directory: Path, ours: Ours) -> tuple[str, list[Figure]]:

@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 
-from formation_gnc.supervision.monitor import AXES, Monitor, Observation
+from formation_gnc.supervision.monitor import Monitor, Observation
 from formation_gnc.supervision.parameters import SupervisorParameters
 from formation_gnc.supervision.thresholds import normal_threshold, suspicion
+from formation_gnc.types import AXES
 
 
 class ResidualAcceleration(Monitor):

@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 
-from formation_gnc.supervision.monitor import AXES, Monitor, Observation, When
+from formation_gnc.supervision.monitor import Monitor, Observation, When
 from formation_gnc.supervision.parameters import SupervisorParameters
+from formation_gnc.types import AXES
 
 
 class ThrustResponse(Monitor):

@@ -5,8 +5,9 @@ from math import tau
 
 from formation_gnc.supervision.held import HeldTime
 from formation_gnc.supervision.modes import Mode
-from formation_gnc.supervision.monitor import AXES, Monitor, Observation, When
+from formation_gnc.supervision.monitor import Monitor, Observation, When
 from formation_gnc.supervision.parameters import SupervisorParameters
+from formation_gnc.types import AXES
 
 TOLERANCE = 0.1
 """Force that counts as none, over the limit of the axis."""
