@@ -1,6 +1,7 @@
 """Subscriptions that know the publisher of each message, which rclpy of Jazzy leaves out of what it hands on."""
 
 import ctypes
+import struct
 from collections.abc import Callable
 from typing import Any
 
@@ -12,9 +13,6 @@ from rclpy.type_support import check_is_valid_msg_type
 from rclpy.waitable import NumberOfEntities, Waitable
 
 from formation_gnc.flight.reception import Information
-
-BURST = 100
-"""Messages taken at once; then timers have their turn, whoever floods the topic."""
 
 UNNUMBERED = 2**64 - 1
 """Sequence number of a middleware that has none."""
@@ -54,6 +52,9 @@ class _MessageInfo(ctypes.Structure):
     ]
 
 
+_INFORMATION = struct.Struct("@q8xQ16x16s")
+"""Of _MessageInfo: source timestamp, publication sequence number, publisher."""
+
 _take = ctypes.CDLL("librcl.so").rcl_take_serialized_message
 _take.argtypes = [ctypes.c_void_p] * 4
 _default_allocator = ctypes.CDLL("librcutils.so").rcutils_get_default_allocator
@@ -85,7 +86,8 @@ class IdentifiedSubscription(Waitable):  # type: ignore[misc]
             self.handle = rclpy_implementation.Subscription(node.handle, kind, topic, profile.get_c_qos_profile())
         self._node, self._callback = node, callback
         self._buffer, self._info = _Buffer(allocator=_default_allocator()), _MessageInfo()
-        self._arguments = self.handle.pointer, ctypes.addressof(self._buffer), ctypes.addressof(self._info), None
+        addresses = self.handle.pointer, ctypes.addressof(self._buffer), ctypes.addressof(self._info)
+        self._arguments = *map(ctypes.c_void_p, addresses), None
         self._waitables = [self, *events.create_event_handlers(node.default_callback_group, self.handle, topic)]
         for each in self._waitables:
             node.add_waitable(each)
@@ -97,19 +99,17 @@ class IdentifiedSubscription(Waitable):  # type: ignore[misc]
             if result != _NONE_THERE:
                 self._node.get_logger().warning(f"a message was not given by the middleware: error {result}", once=True)
             return None
-        info, number = self._info, self._info.publication_sequence_number
+        published, number, publisher = _INFORMATION.unpack_from(self._info)
         return ctypes.string_at(self._buffer.data, self._buffer.length), {
-            "publisher": bytes(info.publisher),
-            "source_timestamp": info.source_timestamp,
+            "publisher": publisher,
+            "source_timestamp": published,
             "publication_sequence_number": None if number == UNNUMBERED else number,
         }
 
     def is_ready(self, _wait_set: Any) -> bool:
-        """Take what is there."""
-        for _ in range(BURST):
-            message = self.take()
-            if message is None:
-                break
+        """Take a message; the executor asks once for each, and after a burst lets timers have their turn."""
+        message = self.take()
+        if message is not None:
             self._callback(*message)
         return False
 

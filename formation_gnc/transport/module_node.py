@@ -3,8 +3,9 @@
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
+from math import inf
 from threading import BoundedSemaphore
-from time import perf_counter, time_ns
+from time import monotonic, perf_counter, time_ns
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -17,7 +18,7 @@ from formation_gnc.parameters import dump
 from formation_gnc.records import WARNINGS, EventKind, Timing
 from formation_gnc.transport.bus import IntraProcessBus
 from formation_gnc.transport.diagnostics import PERIOD, DiagnosticsPublisher
-from formation_gnc.transport.node import ConfiguredNode, rejected
+from formation_gnc.transport.node import CHECK_PERIOD, ConfiguredNode, rejected
 from formation_gnc.types import NANOSECONDS
 
 SETTLING = 0.1
@@ -66,8 +67,10 @@ class ModuleNode(ConfiguredNode):
         self._waiting: dict[str, list[tuple[int, Any]]] = {}
         self._catch_up_soon = self.create_wall_timer(SETTLING, self._catch_up)
         self._catch_up_soon.cancel()
-        self._forgo_soon = self.create_wall_timer(ALONE, self._forgo)
-        self._forgo_soon.cancel()
+        self._has_caught_up = False
+        self._began = inf
+        """Since when (s of a monotonic clock) a tick waits for what may have no publisher; infinite for none."""
+        self.create_wall_timer(CHECK_PERIOD, self._forgo)
         if bus is None:
             self.subscribe_inputs()
         self._answered, self._warning = 0, ""
@@ -103,11 +106,12 @@ class ModuleNode(ConfiguredNode):
         is_behind = topic == self._instance.needed[0] and self._instance.synchronizer.unanswered is not None
         is_late = time_ns() - published >= LATE
         if not self._waiting and not is_behind and not is_late:
-            self._catch_up_soon.timer_period_ns = SOON
+            if not self._has_caught_up:
+                self._catch_up_soon.timer_period_ns, self._has_caught_up = SOON, True
             self._take(topic, record)
             return
         # Until a node has caught up, what was before its start may come in parts.
-        if not self._waiting or (is_late and self._catch_up_soon.timer_period_ns != SOON):
+        if not self._waiting or (is_late and not self._has_caught_up):
             self._catch_up_soon.reset()
         self._waiting.setdefault(topic, []).append((published, record))
 
@@ -137,14 +141,14 @@ class ModuleNode(ConfiguredNode):
         if inputs is not None:
             self._answer(inputs)
         elif topic == self._instance.needed[0] and self._instance.delayed:
-            self._forgo_soon.reset()
+            self._began = monotonic()
 
     def _forgo(self) -> None:
         """Go on without what nobody publishes, such as a mode where there is no supervisor."""
-        self._forgo_soon.cancel()
         synchronizer = self._instance.synchronizer
-        if synchronizer.unanswered is None:
+        if monotonic() - self._began < ALONE or synchronizer.unanswered is None:
             return
+        self._began = inf
         silent = [topic for topic in self._instance.delayed if not self.identities_on(topic)]
         inputs = synchronizer.forgo(silent) if silent else None
         if inputs is not None:
