@@ -30,10 +30,11 @@ EXPRESSIONS = {
     "delta_v_per_orbit_m_s": "delta-v per orbit",
     "nees_ratio": "mean NEES",
     "nearest_approach_m": "nearest approach",
+    "detections": "faults detected",
 }
-"""Figures over time with their titles; the last of the run, the others of each deputy."""
+"""Figures over time with their titles: those of the run as a whole, and of each deputy."""
 
-OF_RUN = ("nearest_approach_m",)
+OF_RUN = "nearest_approach_m", "detections"
 """Figures of the run as a whole."""
 
 WITHIN_TITLE = "time to within {} m"
@@ -207,7 +208,8 @@ class FlightRecord:
             own |= _over_time(path, summary, within)
             row |= {f"{name}.{figure}": value for figure, value in own.items()}
         row["nearest_approach_m"] = float(np.sqrt(self._nearest))
-        row["misses"] = sum(event.kind == EventKind.MISS for event in self._events)
+        for column, kind in (("misses", EventKind.MISS), ("detections", EventKind.DETECTION)):
+            row[column] = sum(event.kind == kind for event in self._events)
         row["verdict"] = str(max(verdicts, key=list(Verdict).index))
         return row
 

@@ -34,7 +34,7 @@ class Reckoning:
 class DeadReckoner:
     """Propagates chief and deputy under the point mass with J2 and the applied thrust, from comparison to comparison.
 
-    Thrust enters by its mean over the interval, by when it came to first order, and turned with the axes meanwhile.
+    Thrust enters tick by tick, as an impulse in its middle, by Hill's equations.
     """
 
     def __init__(self, tick_ns: int, thrust: Vector) -> None:

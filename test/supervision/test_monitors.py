@@ -199,6 +199,17 @@ def test_mass_follows_the_propellant_used() -> None:
     assert level(health, "mass") is Level.FAILED
 
 
+@pytest.mark.parametrize(
+    ("first", "later", "expected"),
+    [(103.0, 103.0, Level.OK), (103.0, 100.0, Level.FAILED), (120.0, 120.0, Level.FAILED)],
+)
+def test_an_initial_mass_that_is_known_badly_is_no_fault(first: float, later: float, expected: Level) -> None:
+    health = Health(parameters())
+    for tick in range(30):
+        feed(health, tick, measurement={"mass": first if tick < 15 else later})
+    assert level(health, "mass") is expected
+
+
 def test_a_supervisor_that_starts_in_flight_takes_a_mass_that_can_be() -> None:
     health = Health(parameters(specific_impulse=100.0, thrust_limit=(1.0, 1.0, 1.0)))
     for tick in range(5000, 5020):

@@ -30,9 +30,10 @@ STEP = 15.0
 """Longest integration step, s: in low orbit an error of a millimetre in fifty minutes."""
 
 SUMS, BEFORE, SPEED, SHIFT, BURNED, KNOWN, TURN, TALLY = 0, 3, 6, 9, 12, 13, 14, 15
-"""Places in the memory of `tally`: sums (3,) of differences over their limit; force (3,) commanded before, N; speed and
-shift (3,) by thrust since the last comparison, in the Hill frame of the next one, m/s and m; propellant burned, kg;
-whether a command before is known; rate of the Hill frame, rad/s; their number."""
+"""Places in the memory of `tally`: sums (3,) of differences over their limit; force (3,) commanded before, N; relative
+velocity and position (3,) that the thrust since the last comparison will have caused at the next one, by Hill's
+equations, m/s and m; propellant burned, kg; whether a command before is known; rate of the Hill frame, rad/s, not 0;
+their number."""
 
 LIMIT, ALLOWED, SCALE, TOTAL, ECLIPSE, SUSPECT, CEILING, PER_IMPULSE, RATE, TALLY_SETTINGS = 0, 3, *range(6, 14)
 """Places in the settings of `tally`: limit (3,), N; allowed difference (3,) over it, and over the command; limit of the
@@ -55,7 +56,7 @@ def tally(
     """Add the force of a tick that has ended; returns whether a sum of differences is suspect.
 
     Args:
-        applied: force (3,) by telemetry, Hill frame, N.
+        applied: force (3,) by telemetry, Hill frame at the start of the tick, held in inertial space over it, N.
         commanded: force (3,) for that tick.
         is_known: whether the command is.
         in_eclipse: whether the tick began in eclipse.
@@ -71,10 +72,16 @@ def tally(
         total = sqrt(x * x + y * y + z * z) if settings[TOTAL] > 0.0 else abs(x) + abs(y) + abs(z)
         memory[BURNED] += min(total * settings[PER_IMPULSE], settings[RATE]) * tick
         if 0.0 < mass < inf:
-            c, s, impulse = cos(memory[TURN] * after), sin(memory[TURN] * after), tick / mass
-            for axis, force in enumerate((c * x + s * y, c * y - s * x, z)):
-                memory[SPEED + axis] += force * impulse
-                memory[SHIFT + axis] += force * impulse * after
+            rate, impulse = memory[TURN], tick / mass
+            c, s = cos(0.5 * rate * tick), sin(0.5 * rate * tick)  # along the axes at the start of the tick, held
+            x, y, z = impulse * (c * x + s * y), impulse * (c * y - s * x), impulse * z
+            c, s = cos(rate * after), sin(rate * after)
+            memory[SHIFT] += (s * x + 2.0 * (1.0 - c) * y) / rate
+            memory[SHIFT + 1] += (4.0 * s * y - 2.0 * (1.0 - c) * x) / rate - 3.0 * after * y
+            memory[SHIFT + 2] += s * z / rate
+            memory[SPEED] += c * x + 2.0 * s * y
+            memory[SPEED + 1] += (4.0 * c - 3.0) * y - 2.0 * s * x
+            memory[SPEED + 2] += c * z
     if not (is_known and isfinite(commanded[0] + commanded[1] + commanded[2])):
         memory[KNOWN] = 0.0
         return False
@@ -104,8 +111,8 @@ def tally(
 
 
 @inline
-def _advance(state: Array, ax: float, ay: float, az: float, duration: float, steps: int) -> None:
-    """Propagate an inertial state (6,) under point mass, J2 and a held acceleration (Runge-Kutta, order four)."""
+def _advance(state: Array, duration: float, steps: int) -> None:
+    """Propagate an inertial state (6,) under point mass and J2 (Runge-Kutta, order four)."""
     h = duration / steps
     rates, stage = np.empty((4, 6)), np.empty(6)
     for _ in range(steps):
@@ -115,7 +122,7 @@ def _advance(state: Array, ax: float, ay: float, az: float, duration: float, ste
                 stage[c] = state[c] + (share * h * rates[i - 1, c] if i > 0 else 0.0)
             gx, gy, gz = oblate_acceleration(stage[0], stage[1], stage[2])
             rates[i, 0], rates[i, 1], rates[i, 2] = stage[3], stage[4], stage[5]
-            rates[i, 3], rates[i, 4], rates[i, 5] = gx + ax, gy + ay, gz + az
+            rates[i, 3], rates[i, 4], rates[i, 5] = gx, gy, gz
         for c in range(6):
             state[c] += h / 6.0 * (rates[0, c] + 2.0 * rates[1, c] + 2.0 * rates[2, c] + rates[3, c])
 
@@ -164,7 +171,7 @@ def _compare_chief(ephemeris: Array, anchors: Array, seconds: float, steps: int,
     _, unmodelled = _unmodelled(ephemeris)
     for k in range(len(anchors)):
         anchor = anchors[k, :6]
-        _advance(anchor, 0.0, 0.0, 0.0, seconds, steps)
+        _advance(anchor, seconds, steps)
         anchors[k, 6] += seconds
         square = 0.0
         for c in range(3):
@@ -179,27 +186,21 @@ def _compare_chief(ephemeris: Array, anchors: Array, seconds: float, steps: int,
 
 @inline
 def _compare_track(
-    track: Array, covariance: Array, relative: Array, mean: Array, seconds: float, steps: int, out: Array
+    track: Array, covariance: Array, relative: Array, thrust: Array, seconds: float, steps: int, out: Array
 ) -> None:
     """Difference of a relative state from a track, which moves on, in standard deviations of the latter."""
     chief, deputy = track[:6], track[6:12]
     _, rate = hill_frame(chief)
-    _advance(chief, 0.0, 0.0, 0.0, seconds, steps)
-    axes, _ = hill_frame(chief)
-    ax, ay, az = 0.0, 0.0, 0.0
-    for i in range(3):
-        ax += mean[3 + i] * axes[i, 0] / seconds
-        ay += mean[3 + i] * axes[i, 1] / seconds
-        az += mean[3 + i] * axes[i, 2] / seconds
-    _advance(deputy, ax, ay, az, seconds, steps)
-    for c in range(3):  # the mean of the thrust is in the propagation
-        for i in range(3):
-            deputy[c] += (mean[i] - 0.5 * mean[3 + i] * seconds) * axes[i, c]
+    _advance(chief, seconds, steps)
+    _advance(deputy, seconds, steps)
     track[12] += seconds
     phi = _hill_transition(rate, seconds)
     _congruence(phi, covariance)
     axes, rate = hill_frame(chief)
     reckoned = to_relative(axes, rate, chief, deputy)
+    for i in range(6):
+        reckoned[i] += thrust[i]
+    deputy[:] = to_inertial(axes, rate, chief, reckoned)
     radius, unmodelled = _unmodelled(chief)
     distance = sqrt(reckoned[0] ** 2 + reckoned[1] ** 2 + reckoned[2] ** 2)
     differential = 4.0 * unmodelled * distance / radius
@@ -262,7 +263,7 @@ def reckon(
         tracks: (N, 13) propagated estimates: chief and deputy, inertial, and time, s; changed. Time below 0 for none.
         covariances: (N, 6, 6) of these; changed.
         lengths: (N,) time after which each starts anew, s.
-        memory: of `tally`: speed and shift by thrust since the last comparison, which are cleared, and the rate of the
+        memory: of `tally`: what the thrust since the last comparison has caused, which is cleared, and the rate of the
             Hill frame, which is set.
         out: (2 + 6 N,) ratio and time of the ephemeris, and differences of the relative state from each track, in
             standard deviations.
@@ -271,12 +272,12 @@ def reckon(
         Which of `out` is there: bit 0 for the ephemeris, bit 1 + n for track n.
     """
     steps = int(np.ceil(seconds / STEP))
-    mean = np.empty(6)
+    thrust = np.empty(6)
     for i in range(3):
-        mean[i], mean[3 + i] = memory[SHIFT + i], memory[SPEED + i]
+        thrust[i], thrust[3 + i] = memory[SHIFT + i], memory[SPEED + i]
         memory[SHIFT + i] = memory[SPEED + i] = 0.0
     _, rate = hill_frame(ephemeris)
-    if isfinite(rate):
+    if isfinite(rate) and rate > 0.0:
         memory[TURN] = rate
     given = 0
     if anchors[0, 6] >= 0.0:
@@ -288,7 +289,7 @@ def reckon(
             anchors[k, :6], anchors[k, 6] = ephemeris, 0.5 * WINDOW * k
     for n in range(len(tracks)):
         if estimates == 2 and tracks[n, 12] >= 0.0:
-            _compare_track(tracks[n], covariances[n], relative, mean, seconds, steps, out[2 + 6 * n : 8 + 6 * n])
+            _compare_track(tracks[n], covariances[n], relative, thrust, seconds, steps, out[2 + 6 * n : 8 + 6 * n])
             given |= 2 << n
         if estimates == 0:
             tracks[n, 12] = -1.0

@@ -7,12 +7,15 @@ from formation_gnc.types import NANOSECONDS
 GAUGE, USED = 0.01, 0.1
 """Allowed difference: a share of the initial mass, and one of the propellant used."""
 
+INITIAL = 0.1
+"""Share within which the first mass told may differ from what the parameters say: it is taken for the initial one."""
+
 
 class Mass(Monitor):
-    """Difference of the mass told from the initial mass less what the applied force has cost, over the allowance.
+    """Difference of the mass told from the first one told less what the applied force has cost, over the allowance.
 
-    Assumes: a constant specific impulse, and telemetry of the applied force. Over ticks that were not observed, the
-    mass told is taken within what the thrusters can have burned.
+    Assumes: a constant specific impulse, telemetry of the applied force, and that the first mass told is true to a
+    tenth. Over ticks that were not observed, the mass told is taken within what the thrusters can have burned.
     Cannot see: a leak below a hundredth of the mass.
     Delay: ten ticks for a jump beyond the allowance.
     """
@@ -24,7 +27,7 @@ class Mass(Monitor):
 
     def prepare(self) -> None:
         """The mass at the start of a flight."""
-        self._start, self._last = self.parameters.mass, 0
+        self._start, self._last, self._is_known = self.parameters.mass, 0, False
 
     def feed(self, observation: Observation) -> None:
         """Judge, but where it has just been anchored."""
@@ -34,6 +37,8 @@ class Mass(Monitor):
         if observation.missed:
             self._anchor(measurement.mass, (observation.time - self._last) / NANOSECONDS, thrust)
         self._last = observation.time
+        if not self._is_known and abs(measurement.mass - self._start) <= INITIAL * self._start:
+            self._start, self._is_known = measurement.mass + thrust.burned, True
         if not observation.missed:
             expected = self._start - thrust.burned
             allowed = GAUGE * self.parameters.mass + USED * max(0.0, self.parameters.mass - expected)

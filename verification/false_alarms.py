@@ -1,0 +1,118 @@
+"""Clean flights: how often supervision finds a fault where there is none.
+
+A thousand flights, dispersed in start, mass, thrust and noise as far as the flight software is to stand without a word.
+"""
+
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from scipy.stats import binom
+
+from formation_gnc.campaign.case import REASON, fly_case
+from formation_gnc.campaign.definition import Campaign, load_campaign
+from formation_gnc.sil.scenario import load_scenario
+from verification.figure import TABLE, Figure, failures
+
+RUNS = {"leader_follower": 400, "eccentric_leo": 300, "geostationary": 150, "tetrahedral": 100, "projected_circle": 50}
+"""Flights of each scenario: more of those with fewer satellites."""
+
+TICK, LONGEST = 10.0, 86400.0
+"""Ticks of the flights, unless the scenario's are longer, and their duration at most, s."""
+
+FLEETS = 12_000.0
+"""The same of several satellites: acquisition, two revolutions, the reconfiguration of one."""
+
+CONFIDENCE = 0.99
+"""With which more alarms than allowed show that their probability is higher than stated."""
+
+HEADING = f"""# False alarms
+
+{sum(RUNS.values())} flights without a fault, on ticks of {TICK:g} s, of a day at most, those of several satellites of
+{FLEETS:g} s: each with its own noise, start (2 m and 2 mm/s of standard deviation on each axis), mass (1 %),
+misalignment (up to 0.02 rad) and noise of the thrust (up to 5 %).
+Supervision states a probability of a false alarm for each satellite and flight (`false_alarm`); as many alarms are
+allowed as that gives with {CONFIDENCE:.0%}.
+"""
+
+
+@dataclass(frozen=True)
+class Clean:
+    """What came of a scenario's flights."""
+
+    scenario: str
+    satellites: int
+    probability: float
+    """Of a false alarm, for each satellite and flight, as stated."""
+    alarms: list[int]
+    """Faults detected, by flight."""
+    worst: float
+    """Largest final error, m."""
+
+    @property
+    def allowed(self) -> int:
+        """Flights with an alarm that the stated probability allows."""
+        any_of_them = 1.0 - (1.0 - self.probability) ** self.satellites
+        return int(binom.ppf(CONFIDENCE, len(self.alarms), any_of_them))
+
+
+def document(scenario: str) -> str:
+    """File of the campaign of a scenario."""
+    plant = load_scenario(scenario).plant
+    tick, longest = max(TICK, plant.tick), FLEETS if len(plant.deputies) > 1 else LONGEST
+    duration = tick * int(min(plant.duration, longest) / tick)
+    lines = [f"scenario: {scenario}", "seed: 15", "set:", f"  plant.tick: {tick}", f"  plant.duration: {duration}"]
+    lines.append("dispersions:")
+    for name in plant.deputies:
+        lines += [
+            f"  plant.{name}.relative_state: {{hill_normal: {{sigma: [2.0, 2.0, 2.0, 0.002, 0.002, 0.002]}}}}",
+            f"  plant.{name}.mass: {{normal: {{mean: 1.0, sigma: 0.01}}, within: [0.95, 1.05], as: factor}}",
+            f"  plant.{name}.thrusters.misalignment: {{uniform: {{low: 0.0, high: 0.02}}}}",
+            f"  plant.{name}.thrusters.magnitude_noise: {{uniform: {{low: 0.0, high: 0.05}}}}",
+        ]
+    return "\n".join(lines) + "\n"
+
+
+@cache
+def campaign(scenario: str) -> Campaign:
+    """Campaign of a scenario."""
+    with TemporaryDirectory() as directory:
+        path = Path(directory) / f"clean_{scenario}.yaml"
+        path.write_text(document(scenario))
+        return load_campaign(path)
+
+
+def fly(scenario: str, case: int) -> dict[str, Any]:
+    """Figures of one flight; raises RuntimeError for one that fails."""
+    given = campaign(scenario)
+    row = dict(fly_case(given, case, given.configurations[0]).row)
+    if row[REASON]:
+        raise RuntimeError(f"{scenario}, case {case}: {row[REASON]}")
+    return row
+
+
+def fly_all(scenario: str, pool: ProcessPoolExecutor) -> Clean:
+    """All flights of a scenario."""
+    rows = list(pool.map(fly, [scenario] * RUNS[scenario], range(RUNS[scenario]), chunksize=4))
+    given = load_scenario(scenario)
+    supervisors = [modules["supervisor"] for modules in given.deputies.values()]
+    errors = [row[f"{name}.final_error_m"] for row in rows for name in given.plant.deputies]
+    alarms = [row["detections"] for row in rows]
+    return Clean(scenario, len(supervisors), max(each.false_alarm for each in supervisors), alarms, max(errors))
+
+
+def main(output: Path) -> int:
+    """Write the page; the number of scenarios with more alarms than allowed."""
+    lines, figures = [HEADING, TABLE.replace("printed", "stated")], list[Figure]()
+    with ProcessPoolExecutor() as pool:
+        for scenario in RUNS:
+            clean = fly_all(scenario, pool)
+            alarmed = sum(each > 0 for each in clean.alarms)
+            words = f"{scenario}, {clean.satellites} satellites: flights with an alarm of {RUNS[scenario]}"
+            figures.append(Figure(words, f"{clean.probability:g}", alarmed, "flights", 0.0, clean.allowed))
+            print(f"{scenario}: {alarmed} of {RUNS[scenario]}, worst final error {clean.worst:.3g} m", flush=True)
+    (output / "false_alarms.md").write_text("\n".join([*lines, *(figure.row for figure in figures)]) + "\n")
+    return failures(figures)
