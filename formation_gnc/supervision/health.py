@@ -40,6 +40,8 @@ class Health:
         slow = self._reckoner.ticks
         self._rare = slow * max(1, round(RARE * NANOSECONDS / (slow * parameters.tick_ns)))
         """Ticks between rare ones."""
+        self.notable: list[Verdict] = []
+        """The latest verdicts that are not well, in the order of the registry; a new list where any monitor was fed."""
         self._last: int | None = None
         self._commanded: Vector | None = None
         self._continues = self._in_eclipse = self._was_suspect = False
@@ -92,6 +94,7 @@ class Health:
             observation = Observation(time, missed, left == 0, mode, *given, self._thrust, reckoning)
             for monitor in self._fed(kinds):
                 monitor.feed(observation)
+            self.notable = [each for monitor in self.monitors if monitor.notable for each in monitor.notable.values()]
         return True
 
     def _chosen(self, kinds: int) -> list[Monitor]:
@@ -120,7 +123,3 @@ class Health:
         """The latest verdict of every monitor on each of its subjects, in the order of the registry."""
         for monitor in self.monitors:
             yield from monitor.verdicts()
-
-    def notable(self) -> list[Verdict]:
-        """The latest verdicts that are not well."""
-        return [verdict for monitor in self.monitors if monitor.notable for verdict in monitor.notable.values()]

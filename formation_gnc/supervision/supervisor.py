@@ -87,6 +87,7 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         self._failed: dict[tuple[str, str], int] = {}
         """Time (ns) of the latest failure by monitor and subject."""
         self._statuses: list[tuple[str, str, Level]] | None = None
+        self._looked_at: list[Verdict] | None = None
         self._command: Trigger | None = None
         self._evasion: Evasion | None = None
         self._reason, self._since = "", 0
@@ -181,7 +182,7 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         if measurement is not None and measurement.time != time - tick:
             ticks, measurement = (time - measurement.time) // tick, None
         self._health.feed(time - tick, self._in_force, measurement, estimate, target, status, thrust)
-        failures = [each for each in self._health.notable() if each.level is Level.FAILED]
+        failures = [each for each in self._health.notable if each.level is Level.FAILED]
         for each in failures:
             key = each.monitor, each.subject
             if time - self._failed.get(key, -time) > QUIET * tick or key not in self._failed:
@@ -241,7 +242,7 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
     def _way_out(self, estimate: Estimate | None, target: Target | None) -> Evasion:
         """The way out: away from the neighbours that guidance knows, with the axes that work."""
         broken = {each.subject for each in self._restrictions if each.kind == RestrictionKind.AXIS}
-        failing = {each.monitor for each in self._health.notable() if each.level is Level.FAILED}
+        failing = {each.monitor for each in self._health.notable if each.level is Level.FAILED}
         return plan_evasion(
             self._mode,
             self._since,
@@ -276,7 +277,7 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         predicted = [] if target is None else target.separation
         if not predicted or self.parameters.least_separation <= 0.0 or not self.parameters.enabled:
             return False
-        is_low = any(each.monitor == SEPARATION and each.level is Level.FAILED for each in self._health.notable())
+        is_low = any(each.monitor == SEPARATION and each.level is Level.FAILED for each in self._health.notable)
         ended = self._since if self._evasion is None else self._evasion.end
         return predicted[0].time >= ended and not is_low
 
@@ -308,7 +309,10 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
 
     def _health_report(self, time: int) -> HealthReport | None:
         """The verdicts that are not well, where subjects or levels have changed."""
-        notable = self._health.notable() if self.parameters.enabled else []
+        notable = self._health.notable if self.parameters.enabled else []
+        if notable is self._looked_at:
+            return None
+        self._looked_at = notable
         statuses = [(each.monitor, each.subject, each.level) for each in notable]
         if statuses == self._statuses:
             return None
