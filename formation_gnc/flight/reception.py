@@ -52,6 +52,9 @@ class Reception[T]:
     def receive(self, data: bytes, about: Information) -> None:
         """Take a message from the middleware."""
         publisher = about["publisher"]
+        if publisher == self.lock.chosen and self.lock.candidate is None:  # the common case
+            self._count(data, about)
+            return
         now = monotonic()
         verdict = self.lock.judge(publisher, now)
         if verdict is Verdict.COUNTS:

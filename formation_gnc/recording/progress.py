@@ -1,6 +1,7 @@
 """Progress of a recording: the stamp up to which a run is recorded completely."""
 
 from collections.abc import Callable
+from functools import cache
 
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import GRAPH, commanding
@@ -41,9 +42,9 @@ class RecordingProgress:
 
         Time that runs backwards is a new run; where a topic has several publishers, it is another one's time.
         """
-        deputy, name = topics.deputy_of(topic), topic.rpartition("/")[2]
-        latest = self._answers_of(deputy) if name in self._answer_names else self._plant
-        key = name if name in self._answer_names else topic
+        deputy, name = _parts(topic)
+        is_answer = name in self._answer_names
+        latest, key = (self._answers_of(deputy), name) if is_answer else (self._plant, topic)
         if stamp < latest.get(key, NONE):
             if publishers() > 1:
                 return
@@ -80,4 +81,13 @@ class RecordingProgress:
         return max(min(stamp for name, stamp in answers if name in self._commanding or stamp >= missed), missed)
 
     def _answers_of(self, deputy: str) -> dict[str, int]:
-        return self._answers.setdefault(deputy, dict.fromkeys(self._answer_names, NONE))
+        answers = self._answers.get(deputy)
+        if answers is None:
+            answers = self._answers[deputy] = dict.fromkeys(self._answer_names, NONE)
+        return answers
+
+
+@cache
+def _parts(topic: str) -> tuple[str, str]:
+    """Deputy and name of a topic."""
+    return topics.deputy_of(topic), topic.rpartition("/")[2]
