@@ -16,6 +16,11 @@ if TYPE_CHECKING:
     from formation_gnc.analysis.figures import figures as figures
     from formation_gnc.analysis.overview import draw_overview as draw_overview
     from formation_gnc.analysis.overview import draw_panels as draw_panels
+    from formation_gnc.analysis.panels.panel import DeputyPanel as DeputyPanel
+    from formation_gnc.analysis.panels.panel import FleetPanel as FleetPanel
+    from formation_gnc.analysis.plot import Axis as Axis
+    from formation_gnc.analysis.plot import Curve as Curve
+    from formation_gnc.analysis.plot import Plot as Plot
     from formation_gnc.analysis.report import write_report as write_report
     from formation_gnc.analysis.run_history import RunHistory as RunHistory
     from formation_gnc.analysis.trajectory import Trajectory as Trajectory
@@ -43,11 +48,15 @@ if TYPE_CHECKING:
     from formation_gnc.sil.runner import Run as Run
     from formation_gnc.sil.scenario import Scenario as Scenario
     from formation_gnc.sil.scenario import load_scenario as load_scenario
+    from formation_gnc.supervision.monitor import Monitor as Monitor
+    from formation_gnc.supervision.monitor import Observation as Observation
 
 _PLACES = {
     "analysis.design_report": "Design design",
     "analysis.figures": "DeputyFigures RunFigures figures",
     "analysis.overview": "draw_overview draw_panels",
+    "analysis.panels.panel": "DeputyPanel FleetPanel",
+    "analysis.plot": "Axis Curve Plot",
     "analysis.report": "write_report",
     "analysis.run_history": "RunHistory",
     "analysis.trajectory": "Trajectory trajectories",
@@ -65,6 +74,7 @@ _PLACES = {
     "sil.replay_recorder": "replay_into",
     "sil.runner": "Run",
     "sil.scenario": "Scenario load_scenario",
+    "supervision.monitor": "Monitor Observation",
 }
 """Names by module below formation_gnc: the imports above, for the interpreter."""
 

@@ -13,7 +13,9 @@ from typing import Any
 
 from formation_gnc.errors import ConfigurationError
 
-GROUPS = tuple(f"formation_gnc.{kind}" for kind in ("laws", "formations", "sensors", "forces", "models"))
+KINDS = "laws", "formations", "sensors", "forces", "models", "monitors", "figures"
+
+GROUPS = tuple(f"formation_gnc.{kind}" for kind in KINDS)
 """Groups of entry points, one for each open registry."""
 
 

@@ -62,6 +62,38 @@ def test_two_packages_cannot_bring_the_same_name(monkeypatch):
         list(plugins.load_plugins("laws", Controller, {}))
 
 
+def test_monitors_and_figures_join_their_registries(tmp_path):
+    (tmp_path / "own_health.py").write_text(
+        "from formation_gnc.api import DeputyPanel, Monitor\n"
+        "class Cold(Monitor):\n"
+        "    name, title, test = 'cold', 'temperature', 'bound'\n"
+        "    def feed(self, observation): self.judge('', 2.0, 0.5, 1.0)\n"
+        "FIGURE = DeputyPanel('thermal', lambda history: [])\n"
+    )
+    info = tmp_path / "own_health-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: own-health\nVersion: 1.0\n")
+    entries = "[formation_gnc.monitors]\ncold = own_health:Cold\n[formation_gnc.figures]\nthermal = own_health:FIGURE\n"
+    (info / "entry_points.txt").write_text(entries)
+    look = (
+        "from formation_gnc.analysis.panels.registry import DEPUTY_PANELS;"
+        "from formation_gnc.api import Run, load_scenario;"
+        "print(DEPUTY_PANELS[-1].name);"
+        "table = ['{monitor: cold, response: go_to, mode: safe}'];"
+        "run = Run(load_scenario('leader_follower', {'/**/supervisor': {'fault_table': table}}));"
+        "found = [];"
+        "[run.tick(lambda topic, record: found.append((topic, record))) for _ in range(15)];"
+        "print([str(record) for topic, record in found if topic == '/events' and 'cold' in str(record)])"
+    )
+    path = os.pathsep.join([str(tmp_path), str(ROOT), os.environ.get("PYTHONPATH", "")])
+    command = [sys.executable, "-c", look]
+    output = subprocess.run(command, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, check=True)
+    name, events = output.stdout.splitlines()
+    assert name == "thermal"
+    assert "cold: 2, where 1 is the limit" in events
+    assert "safe" in events
+
+
 def test_the_provenance_names_no_plug_in_where_there_is_none(monkeypatch):
     declared(monkeypatch)
     assert "own-law" not in provenance()["versions"]

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from functools import cache
 from math import isfinite
 
+from formation_gnc.errors import ConfigurationError
 from formation_gnc.records import Estimate, EstimateStatus, Measurement, Status, Target, Thrust
 from formation_gnc.supervision.modes import Mode
 from formation_gnc.supervision.monitor import Monitor, Observation, Verdict, When
@@ -26,13 +27,17 @@ class Health:
     """The monitors of a satellite, with what they share: the tally of thrust, and dead reckoning.
 
     Most ticks bring nothing but a force, which the tally takes. The others are observations, for the monitors that
-    want them.
+    want them. One that raises an exception has failed by that, and is fed again.
     """
 
     def __init__(self, parameters: SupervisorParameters) -> None:
-        """All monitors, each with an equal share of the probability of a false alarm."""
+        """All monitors, each with an equal share of the probability of a false alarm.
+
+        Raises:
+            ConfigurationError: one cannot be prepared for these parameters.
+        """
         share = parameters.false_alarm / len(MONITORS)
-        self.monitors: list[Monitor] = [kind(parameters, share) for kind in MONITORS.values()]
+        self.monitors = [_prepared(kind, parameters, share) for kind in MONITORS.values()]
         self._fed = cache(self._chosen)
         self._tick_ns = parameters.tick_ns
         self._thrust = ThrustTally(parameters, share)
@@ -93,7 +98,10 @@ class Health:
             given = measurement, estimate, target, status, separation
             observation = Observation(time, missed, left == 0, mode, *given, self._thrust, reckoning)
             for monitor in self._fed(kinds):
-                monitor.feed(observation)
+                try:
+                    monitor.feed(observation)
+                except Exception as error:  # whatever a plug-in's raises
+                    monitor.fail(f"{type(error).__name__}: {error}")
             self.notable = [each for monitor in self.monitors if monitor.notable for each in monitor.notable.values()]
         return True
 
@@ -123,3 +131,12 @@ class Health:
         """The latest verdict of every monitor on each of its subjects, in the order of the registry."""
         for monitor in self.monitors:
             yield from monitor.verdicts()
+
+
+def _prepared(kind: type[Monitor], parameters: SupervisorParameters, probability: float) -> Monitor:
+    try:
+        return kind(parameters, probability)
+    except ConfigurationError:
+        raise
+    except Exception as error:  # whatever a plug-in's raises
+        raise ConfigurationError(f"monitor {kind.name}: cannot be prepared: {type(error).__name__}: {error}") from error

@@ -50,6 +50,13 @@ class Verdict:
     statistic: float
     threshold: float
     """Of the statistic, for a failure."""
+    reason: str = ""
+    """Why there is no statistic, where the monitor itself has failed."""
+
+    def __str__(self) -> str:
+        """One line for people."""
+        found = self.reason or f"{self.statistic:.3g}, where {self.threshold:.3g} is the limit"
+        return f"{self.monitor}: {found}"
 
 
 @dataclass(slots=True)
@@ -128,6 +135,10 @@ class Monitor(ABC):
         level = Level.SUSPECT if statistic < failed else Level.FAILED
         self._well.pop(subject, None)
         self.notable[subject] = Verdict(self.name, subject, level, inf if isnan(statistic) else statistic, failed)
+
+    def fail(self, reason: str) -> None:
+        """Set the verdict that the monitor itself has failed, and why."""
+        self.notable[""] = Verdict(self.name, "", Level.FAILED, inf, 1.0, reason)
 
     def forget(self, subject: str) -> None:
         """Take back the verdict on a subject that is not watched any more."""

@@ -186,8 +186,7 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         for each in failures:
             key = each.monitor, each.subject
             if time - self._failed.get(key, -time) > QUIET * tick or key not in self._failed:
-                detail = f"{each.monitor}: {each.statistic:.3g}, where {each.threshold:.3g} is the limit"
-                self.log(time, EventKind.DETECTION, detail, each.subject)
+                self.log(time, EventKind.DETECTION, str(each), each.subject)
             self._failed[key] = time
         active = self._responses.evaluate([(each.monitor, each.subject) for each in failures], ticks, self._mode)
         if active != self._active:

@@ -12,7 +12,7 @@ from formation_gnc.analysis.deputy_history import DeputyHistory
 from formation_gnc.analysis.matplotlib_renderer import draw
 from formation_gnc.analysis.overview import draw_overview, draw_panels
 from formation_gnc.analysis.panels.panel import DeputyPanel, FleetPanel
-from formation_gnc.analysis.panels.registry import DEPUTY_PANELS, FLEET_PANELS
+from formation_gnc.analysis.panels.registry import DEPUTY_PANELS, FLEET_PANELS, guarded
 from formation_gnc.analysis.plot import TIME, Axis, Curve, Plot, Track
 from formation_gnc.analysis.report import Origin, write_report
 from formation_gnc.analysis.run_history import RunHistory
@@ -135,3 +135,13 @@ def test_the_overview_has_all_deputies_and_the_fleet(
     assert draw_overview(fleet, tmp_path / "overview.png", "four").read_bytes().startswith(b"\x89PNG")
     assert drawn.count("control error") == drawn.count("acceleration by thrust, and delta-v") == 4
     assert drawn[:2] == ["relative trajectory", "distances between deputies"]
+
+
+def test_a_figure_of_a_plug_in_that_raises_is_left_out_and_named(capsys: pytest.CaptureFixture[str]) -> None:
+    def plots(_: DeputyHistory) -> list[Plot]:
+        raise KeyError("temperature")
+
+    panel = guarded("thermal", DeputyPanel("thermal", plots))
+    assert isinstance(panel, DeputyPanel)
+    assert panel.plots(None) == []
+    assert capsys.readouterr().err == "formation-gnc: figure thermal is left out: KeyError: 'temperature'\n"

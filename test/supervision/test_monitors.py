@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from formation_gnc.common import Orbit
+from formation_gnc.errors import ConfigurationError
 from formation_gnc.orbit.elements import Elements, state_from_elements
 from formation_gnc.orbit.propagation import Propagator
 from formation_gnc.records import (
@@ -466,3 +467,33 @@ def test_innovations_smaller_than_predicted_are_no_fault() -> None:
     for tick in range(2000):
         feed(health, tick, estimate={"innovations": small if tick % 10 == 0 else [], "nis": 1e-6})
     assert level(health, "innovation_consistency") is Level.OK
+
+
+class Raising(Monitor):
+    """A plug-in's monitor that is wrong."""
+
+    name = "raising"
+    title = "toy"
+    test = "none"
+
+    def feed(self, observation: Observation) -> None:
+        raise ZeroDivisionError("division by zero")
+
+
+def test_a_monitor_that_raises_has_failed_and_others_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(MONITORS, "raising", Raising)
+    health = Health(parameters())
+    for tick in range(30):
+        feed(health, tick, measurement={"mass": 100.0 if tick < 15 else 50.0})
+    assert failed(health) == {"raising", "mass"}
+    assert "raising: ZeroDivisionError: division by zero" in map(str, health.notable)
+
+
+def test_a_monitor_that_cannot_be_prepared_is_a_refusal(monkeypatch: pytest.MonkeyPatch) -> None:
+    def prepare(_: Monitor) -> None:
+        raise KeyError("threshold")
+
+    monkeypatch.setattr(Raising, "prepare", prepare)
+    monkeypatch.setitem(MONITORS, "raising", Raising)
+    with pytest.raises(ConfigurationError, match="monitor raising: cannot be prepared: KeyError: 'threshold'"):
+        Health(parameters())

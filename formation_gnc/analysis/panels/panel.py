@@ -35,8 +35,9 @@ class Panel[H]:
         return self.section or self.name.replace("_", " ")
 
 
-DeputyPanel = Panel[DeputyHistory]
-"""Drawn for every deputy."""
+class DeputyPanel(Panel[DeputyHistory]):
+    """Drawn for every deputy."""
 
-FleetPanel = Panel[RunHistory]
-"""Drawn once, for all deputies."""
+
+class FleetPanel(Panel[RunHistory]):
+    """Drawn once, for all deputies."""

@@ -41,6 +41,25 @@ total, N; whether there is no thrust in eclipse; sum that is suspect, and the la
 kg/(N s); largest rate of it, kg/s; their number."""
 
 
+@inline
+def _reckon_impulse(x: float, y: float, z: float, half: float, after: float, memory: Array) -> None:
+    """Add what an impulse (m/s) will have caused by Hill's equations.
+
+    half: time (s) before it at which its axes were taken, half a tick, over which thrust is held.
+    after: time from it to the next comparison, s.
+    """
+    rate = memory[TURN]
+    c, s = cos(rate * half), sin(rate * half)
+    x, y = c * x + s * y, c * y - s * x
+    c, s = cos(rate * after), sin(rate * after)
+    memory[SHIFT] += (s * x + 2.0 * (1.0 - c) * y) / rate
+    memory[SHIFT + 1] += (4.0 * s * y - 2.0 * (1.0 - c) * x) / rate - 3.0 * after * y
+    memory[SHIFT + 2] += s * z / rate
+    memory[SPEED] += c * x + 2.0 * s * y
+    memory[SPEED + 1] += (4.0 * c - 3.0) * y - 2.0 * s * x
+    memory[SPEED + 2] += c * z
+
+
 @kernel(boolean(ANY_VECTOR, ANY_VECTOR, boolean, boolean, float64, float64, float64, float64[::1], float64[::1]))
 def tally(
     applied: Array,
@@ -72,16 +91,7 @@ def tally(
         total = sqrt(x * x + y * y + z * z) if settings[TOTAL] > 0.0 else abs(x) + abs(y) + abs(z)
         memory[BURNED] += min(total * settings[PER_IMPULSE], settings[RATE]) * tick
         if 0.0 < mass < inf:
-            rate, impulse = memory[TURN], tick / mass
-            c, s = cos(0.5 * rate * tick), sin(0.5 * rate * tick)  # along the axes at the start of the tick, held
-            x, y, z = impulse * (c * x + s * y), impulse * (c * y - s * x), impulse * z
-            c, s = cos(rate * after), sin(rate * after)
-            memory[SHIFT] += (s * x + 2.0 * (1.0 - c) * y) / rate
-            memory[SHIFT + 1] += (4.0 * s * y - 2.0 * (1.0 - c) * x) / rate - 3.0 * after * y
-            memory[SHIFT + 2] += s * z / rate
-            memory[SPEED] += c * x + 2.0 * s * y
-            memory[SPEED + 1] += (4.0 * c - 3.0) * y - 2.0 * s * x
-            memory[SPEED + 2] += c * z
+            _reckon_impulse(tick / mass * x, tick / mass * y, tick / mass * z, 0.5 * tick, after, memory)
     if not (is_known and isfinite(commanded[0] + commanded[1] + commanded[2])):
         memory[KNOWN] = 0.0
         return False
