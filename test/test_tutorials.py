@@ -75,6 +75,17 @@ def test_own_scenario_runs(desk: Path) -> None:
 
 
 @pytest.mark.thorough
+def test_a_fault_runs(desk: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    save("a_fault", desk)
+    fault = 'faults:\n      - "{at: 6000.0,'
+    biased = desk / "biased.yaml"
+    assert fault in biased.read_text()
+    biased.write_text(biased.read_text().replace("at: 6000.0", "at: 10.0"))  # the flights are cut short
+    assert [main(each) for each in commands("a_fault")] == [0] * 6
+    assert "without sensor radius, for innovation_bias radius" in capsys.readouterr().out
+
+
+@pytest.mark.thorough
 def test_own_law_runs(desk: Path) -> None:
     save("own_law", desk)
     assert {path.name for path in desk.iterdir()} == {"own_law.py", "pyproject.toml", "test_own_law.py"}

@@ -66,6 +66,7 @@ DEFAULT = (
     "{monitor: innovation_consistency, persistence: 1, response: warn, return: 60}",
     "{monitor: covariance, persistence: 600, response: go_to, mode: safe, modes: [keep, reconfigure]}",
     "{monitor: estimate_jump, persistence: 1, response: go_to, mode: acquire, return: 60, modes: [keep, reconfigure]}",
+    "{monitor: frozen_estimate, persistence: 1, response: go_to, mode: safe}",
     "{monitor: chief_ephemeris, persistence: 1, response: warn, return: 60}",
     "{monitor: thrust_response, persistence: 1, response: isolate_axis}",
     "{monitor: thruster_on, persistence: 1, response: warn, return: 60}",

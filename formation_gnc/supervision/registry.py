@@ -8,6 +8,7 @@ from formation_gnc.supervision.monitors.control_error import ControlError
 from formation_gnc.supervision.monitors.covariance import Covariance
 from formation_gnc.supervision.monitors.dropout import Dropout
 from formation_gnc.supervision.monitors.estimate_jump import EstimateJump
+from formation_gnc.supervision.monitors.frozen_estimate import FrozenEstimate
 from formation_gnc.supervision.monitors.frozen_readings import FrozenReadings
 from formation_gnc.supervision.monitors.heartbeat import CycleSlips, Heartbeat
 from formation_gnc.supervision.monitors.innovation_consistency import InnovationConsistency
@@ -30,6 +31,7 @@ MONITORS: dict[str, type[Monitor]] = {
     "dropout": Dropout,
     "covariance": Covariance,
     "estimate_jump": EstimateJump,
+    "frozen_estimate": FrozenEstimate,
     "residual_acceleration": ResidualAcceleration,
     "chief_ephemeris": ChiefEphemeris,
     "thrust_response": ThrustResponse,

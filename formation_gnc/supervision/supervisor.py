@@ -54,8 +54,14 @@ RESTRICTIONS = {
 }
 """What modules do without, by response."""
 
-UNTRUSTED = frozenset({"innovation_consistency", "estimate_jump", "chief_ephemeris"})
+UNTRUSTED = frozenset({"innovation_consistency", "estimate_jump", "frozen_estimate", "chief_ephemeris"})
 """Monitors whose failure says that the estimate is not to be steered by."""
+
+BY_INNOVATIONS = frozenset({"innovation_bias", "innovation_drift"})
+"""Monitors that accuse a sensor by what the others have made the state: with fewer than half of them left, these may be
+right, or the model of the motion wrong."""
+
+TOO_FEW = "too few sensors are left to say which are wrong"
 
 SEPARATION = "separation"
 """Monitor by which `avoid` ends."""
@@ -289,18 +295,20 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
                 self.log(time, EventKind.RESPONSE, f"{verb}: {each}", each.subject)
 
     def _restricted(self) -> Iterator[Restriction]:
-        """What modules do without, each once."""
+        """What modules do without, each once; what they did without already goes first."""
         self._blinded = ""
         known = set[tuple[RestrictionKind, str]]()
         sensors_left = len(self.parameters.sensors)
-        for each in self._active:
+        before = {each.subject for each in self._restrictions}
+        for each in sorted(self._active, key=lambda each: each.subject not in before):
             kind = RESTRICTIONS.get(each.response)
             for subject in each.entry.laws or (each.subject,) if kind else ():
                 if kind is None or (kind, subject) in known:
                     continue
                 if kind is RestrictionKind.SENSOR:
-                    if sensors_left == 1:  # without any the state would be lost
-                        self._blinded = f"{each.cause}: the last sensor"
+                    by_others = each.entry.monitor in BY_INNOVATIONS
+                    if sensors_left - 1 < (0.5 * len(self.parameters.sensors) if by_others else 1):
+                        self._blinded = f"{each.cause}: {TOO_FEW if by_others else 'the last sensor'}"
                         continue
                     sensors_left -= 1
                 known.add((kind, subject))

@@ -60,7 +60,7 @@ def records(tick: int, **changes: Any) -> Records:
     time = round(tick * TICK * NANOSECONDS)
     random = np.random.default_rng(tick)
     chief = CHIEFS[tick % len(CHIEFS)]
-    state = np.array([0.0, -100.0, 0.0, 0.0, 0.0, 0.0])
+    state = np.array([0.0, -100.0, 0.0, 0.0, 0.0, 1e-12 * tick])  # no filter gives the same bits again
     sensors = ("radius", "range_rate", "latitude") if tick % 10 == 0 else ()
     noise = random.standard_normal(len(sensors)).tolist()
     measurement = Measurement(
@@ -497,3 +497,13 @@ def test_a_monitor_that_cannot_be_prepared_is_a_refusal(monkeypatch: pytest.Monk
     monkeypatch.setitem(MONITORS, "raising", Raising)
     with pytest.raises(ConfigurationError, match="monitor raising: cannot be prepared: KeyError: 'threshold'"):
         Health(parameters())
+
+
+def test_an_estimate_that_repeats_exactly_is_frozen() -> None:
+    health, state = Health(parameters()), np.array([0.0, -100.0, 0.0, 0.0, 0.0, 1e-9])
+    for tick in range(100):
+        feed(health, tick, estimate={"relative_state": state + 1e-12 * tick})
+    assert level(health, "frozen_estimate") is Level.OK
+    for tick in range(100, 131):
+        feed(health, tick, estimate={"relative_state": state})
+    assert level(health, "frozen_estimate") is Level.FAILED

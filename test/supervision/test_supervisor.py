@@ -243,3 +243,21 @@ def test_what_is_isolated_is_judged_further_and_returns_when_it_is_well() -> Non
     assert all(isolated[begin:end])
     assert 100 < begin < 160
     assert 600 < end < 900
+
+
+def test_sensors_that_contradict_the_state_one_after_the_other_lead_to_safe() -> None:
+    """Of three, one is isolated; with a second one accused it may be the motion that is not as told."""
+    module = supervisor()
+    for number in range(0, 400):
+        shifts = {"radius": 5.0, "latitude": 5.0 if number >= 200 else 0.0}
+        innovations = [
+            replace(each, values=[each.values[0] + shifts.get(each.sensor, 0.0)])
+            for each in records(number)[1].innovations  # type: ignore[union-attr]
+        ]
+        state, _ = tick(module, number, estimate={"innovations": innovations})
+        if number == 199:
+            assert without(state, RestrictionKind.SENSOR) == ["radius"]
+            assert state.mode == "keep"
+    assert without(state, RestrictionKind.SENSOR) == ["radius"]
+    assert state.mode == "safe"
+    assert state.reason.endswith("latitude: too few sensors are left to say which are wrong")

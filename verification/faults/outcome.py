@@ -97,7 +97,9 @@ class Outcome:
     def verdict(self) -> str:
         """What became of it, or what is missing."""
         if not self.is_harmful:
-            return f"no harm, {self.end}" if self.end else "**NO**: harm by the answer"
+            if self.end:
+                return f"no harm, {self.end}"
+            return "no harm" if self.error <= self.bare_error else "**NO**: harm by the answer"
         if not self.found_by:
             return "**NO**: not found"
         if not self.end:
