@@ -265,6 +265,23 @@ def test_a_new_formation_is_no_control_error() -> None:
     assert level(health, "control_error") is Level.OK
 
 
+def test_a_target_that_leaps_is_to_be_reached_anew() -> None:
+    """The same formation, made larger at once: 200 m off is no error that has grown."""
+    health, far = Health(parameters(tube=10.0)), np.array([0.0, -300.0, 0.0, 0.0, 0.0, 0.0])
+    for tick in range(0, 300):
+        feed(health, tick, target={"relative_state": far} if tick >= 100 else {})
+    assert level(health, "control_error") is Level.OK
+    for tick in range(300, 500):  # it is reached, and left again
+        off = 0.0 if tick < 400 else 30.0
+        feed(
+            health,
+            tick,
+            target={"relative_state": far},
+            estimate={"relative_state": far + [off, 0.0, 0.0, 0.0, 0.0, 0.0]},
+        )
+    assert level(health, "control_error") is Level.FAILED
+
+
 @pytest.mark.parametrize(
     ("monitor", "changes", "revolutions"),
     [

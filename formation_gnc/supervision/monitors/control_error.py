@@ -1,11 +1,13 @@
 """A control error that grows although thrust is free."""
 
-from math import dist, inf, isfinite, tau
+from math import dist, hypot, inf, isfinite, tau
 
-from formation_gnc.records import EstimateStatus
+from numpy import cross
+
+from formation_gnc.records import EstimateStatus, Target
 from formation_gnc.supervision.modes import Mode
 from formation_gnc.supervision.monitor import Monitor, Observation, When
-from formation_gnc.types import NANOSECONDS
+from formation_gnc.types import NANOSECONDS, Vector
 
 UNCONTROLLED = "coast"
 """Law that does nothing about an error."""
@@ -19,6 +21,10 @@ JUDGED = (Mode.KEEP, Mode.ACQUIRE)
 WINDOW = 0.125
 """Length of a window, revolutions."""
 
+CURVATURE, LEAP = 2.0, 0.5
+"""Largest distance of a relative orbit from its tangent, over the distance from the chief and the square of the chief's
+angle (Hill's equations: at most 1.5 for the radial, less for the other axes); that of a leap besides, over the tube."""
+
 GROWING = 4
 """Windows in a row with a growing least error: longer than an error swings out on a free orbit."""
 
@@ -26,8 +32,8 @@ GROWING = 4
 class ControlError(Monitor):
     """Distance of estimate and target: out of the tube again once it was in, or growing window by window.
 
-    Not judged while the controller is saturated, on a fallback or told to coast, after a change of formation, and in
-    other modes than `keep` and `acquire`.
+    Not judged while the controller is saturated, on a fallback or told to coast, and in other modes than `keep` and
+    `acquire`. A target that leaps, as when a formation or its size is changed at once, is to be reached anew.
 
     Assumes: a tube that the law holds without a fault, noise of the estimate included; the error of a law on its way to
     the target swings out by less than half a revolution.
@@ -43,7 +49,7 @@ class ControlError(Monitor):
     def prepare(self) -> None:
         """On the way to the target."""
         self._window = WINDOW * tau / self.parameters.mean_motion * NANOSECONDS
-        self._formation = ""
+        self._target: Target | None = None
         self._restart(False)
 
     def _restart(self, reached: bool) -> None:
@@ -59,9 +65,9 @@ class ControlError(Monitor):
             self._restart(False)
             self.forget("")
             return
-        if target.formation != self._formation or estimate.status == EstimateStatus.ACQUIRED:
-            self._formation = target.formation
+        if self._is_new(target, estimate.chief_state) or estimate.status == EstimateStatus.ACQUIRED:
             self._restart(False)
+        self._target = target
         error = dist(estimate.relative_state.tolist()[:3], target.relative_state.tolist()[:3])
         if not isfinite(error):
             return
@@ -78,3 +84,15 @@ class ControlError(Monitor):
         growth = self._growing / GROWING if error > FACTOR * tube else 0.0
         statistic = max(growth, error / (FACTOR * tube) if self._reached else 0.0)
         self.judge("", statistic, 0.75, 1.0)
+
+    def _is_new(self, target: Target, chief: Vector) -> bool:
+        """Whether a target is of another formation, or off the straight line of the last one by more than it curves."""
+        last = self._target
+        if last is None or target.formation != last.formation:
+            return True
+        seconds = (target.time - last.time) / NANOSECONDS
+        position, before = target.relative_state[:3].tolist(), last.relative_state.tolist()
+        angle = hypot(*cross(chief[:3], chief[3:]).tolist()) / float(chief[:3] @ chief[:3]) * seconds
+        curved = CURVATURE * angle**2 * max(hypot(*position), hypot(*before[:3]))
+        off = dist(position, [before[axis] + seconds * before[3 + axis] for axis in range(3)])
+        return off > LEAP * self.parameters.tube + curved
