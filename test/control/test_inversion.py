@@ -46,7 +46,7 @@ def fly(law, estimate, target, ticks, off=OFF, disturbance=0.0):
 @pytest.mark.covers(
     "Joshi outlook: other nonlinear laws",
     "control/dynamic_inversion.py",
-    differs="named there, with no figure to hold ours to; flown beside MPSP in joshi.md",
+    differs="asked for there, without a figure: flown on the cases of chapters 6 and 7",
 )
 def test_inverted_dynamics_are_three_double_integrators(damping, rate, estimate, target):
     """45 km away about an eccentric chief, where Hill's equations lack a tenth of the acceleration."""
@@ -62,7 +62,7 @@ def test_inverted_dynamics_are_three_double_integrators(damping, rate, estimate,
 @pytest.mark.covers(
     "Joshi outlook: other nonlinear laws",
     "control/sliding_mode.py",
-    differs="named there, with no figure to hold ours to; flown beside MPSP in joshi.md",
+    differs="asked for there, without a figure: flown on the cases of chapters 6 and 7",
 )
 @settings(max_examples=5)
 @given(push=st.tuples(*[st.floats(-0.9, 0.9)] * 3))
