@@ -91,7 +91,7 @@ def wheel() -> dict:
     }
 
 
-DATA = {NAME: ["py.typed", "analysis/web/*"]}  # files of the package that are no modules
+DATA = {NAME: ["py.typed", "analysis/web/*", "control/c/*"]}  # files of the package that are no modules
 COMMAND = f"formation-gnc = {NAME}.cli:main"
 PACKAGES = find_packages(include=[NAME, f"{NAME}.*"])
 IS_WHEEL = bool({"bdist_wheel", "dist_info"} & set(sys.argv))  # as pip builds one; colcon asks for neither

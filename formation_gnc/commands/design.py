@@ -9,6 +9,7 @@ from itertools import batched
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -27,6 +28,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         type=Path,
         help="plot singular values, poles and recovery: .png, .pdf or .svg",
+    )
+    parser.add_argument(
+        "--export-c",
+        metavar="DIR",
+        type=Path,
+        help="write the mpc as C to a new folder: its data, OSQP's generated code, and a replay of recorded inputs",
     )
     parser.add_argument("--json", action="store_true", help="print the figures as one JSON object")
 
@@ -48,6 +55,8 @@ def run(options: argparse.Namespace) -> int:
         designed: Design = design(scenario.deputies[deputy]["controller"])
     except ConfigurationError as error:
         raise ConfigurationError(f"{scenario.name}: /{deputy}/controller: {error}") from None
+    if options.export_c is not None:
+        _export(scenario.deputies[deputy]["controller"], options.export_c)
     if options.plot is not None:
         try:
             draw(designed, options.plot)
@@ -72,9 +81,24 @@ def run(options: argparse.Namespace) -> int:
     for name, value in rows.items():
         table.add_row(escape(name), escape(_text(value)))
     console.print(table)
-    if options.plot is not None:
-        console.print(f"plot: {options.plot}", soft_wrap=True)
+    for what, path in (("plot", options.plot), ("C", options.export_c)):
+        if path is not None:
+            console.print(f"{what}: {path}", soft_wrap=True)
     return 0
+
+
+def _export(parameters: Any, directory: Path) -> None:
+    """Write the controller of a deputy as C."""
+    from formation_gnc.control.c_export import export_mpc
+    from formation_gnc.control.controller import Vehicle
+
+    if parameters.algorithm != "mpc":
+        raise ConfigurationError(f"export-c: {parameters.algorithm} cannot be exported; it must be mpc")
+    try:
+        vehicle = Vehicle(parameters.mass, np.array(parameters.thrust_limit))
+        export_mpc(parameters.laws["mpc"], parameters, vehicle, directory)
+    except OSError as error:
+        raise ConfigurationError(f"export-c {directory}: {error.strerror or error}") from None
 
 
 def _text(value: Any) -> str:

@@ -13,6 +13,7 @@ from formation_gnc.control.mixed_sensitivity import MixedSensitivityProblem, Wei
 from formation_gnc.control.models import DESIGN_MODELS, TIME_INVARIANT_MODELS
 from formation_gnc.control.recovery import RecoveryTrajectory
 from formation_gnc.control.riccati import spectral_radius
+from formation_gnc.control.weights import require_in_plane
 from formation_gnc.errors import DesignError
 from formation_gnc.parameters import parameter
 from formation_gnc.records import NavigationState, Target
@@ -130,9 +131,7 @@ class HInfinityController(Controller[HinfParameters]):
         Raises:
             DesignError: no feasible gamma, an unstable sampled loop, or no radial or along-track thruster.
         """
-        if not (vehicle.thrust_limit[:2] > 0.0).all():
-            limits = vehicle.thrust_limit[:2].tolist()
-            raise DesignError(f"hinf: thrust_limit in the orbit plane (x, y) is {limits}; both must be above 0")
+        require_in_plane("hinf", vehicle)
         model = DESIGN_MODELS[parameters.model](common)
         own = {name: np.array(value) for name, value in vars(parameters).items() if isinstance(value, tuple)}
         self.problem = MixedSensitivityProblem(

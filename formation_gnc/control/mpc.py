@@ -123,10 +123,12 @@ class ModelPredictiveController(Controller[MpcParameters]):
         self._steps = parameters.control_horizon or parameters.horizon
         self._check_horizons(common)
         self._model = DESIGN_MODELS[parameters.model](common)
-        self._limit, self._mass = vehicle.thrust_limit, vehicle.mass
+        self.limit, self._mass = vehicle.thrust_limit, vehicle.mass
+        """(3,) largest force of a plan per axis, N."""
         if parameters.total_thrust > 0.0:
-            self._limit = np.minimum(self._limit, parameters.total_thrust)
-        self._unit = float(self._limit.max())
+            self.limit = np.minimum(self.limit, parameters.total_thrust)
+        self.unit = float(self.limit.max())
+        """N; unit of the forces in the QP."""
         gain = "discrete" if self._model.is_time_invariant else "periodic"
         try:
             self.fallback_law = LinearQuadraticRegulator(
@@ -142,7 +144,8 @@ class ModelPredictiveController(Controller[MpcParameters]):
         """The QP at equal intervals of the orbit; one if the model is time-invariant."""
         self._rate: ThrustRate | None = None
         box, others = self._make_constraints()
-        self._constraints = (box, *others)
+        self.constraints = (box, *others)
+        """In the order of their rows in the QP."""
         self.solver = PlanSolver(self.qps[0], box, others)
 
     def _check_horizons(self, common: CommonParameters) -> None:
@@ -175,7 +178,7 @@ class ModelPredictiveController(Controller[MpcParameters]):
             parameters.horizon,
             self._steps,
             self._plan_cost(intervals),
-            self._unit / self._mass,
+            self.unit / self._mass,
             intervals,
         )
 
@@ -186,7 +189,7 @@ class ModelPredictiveController(Controller[MpcParameters]):
         absolute = parameters.cost == "absolute"
         if parameters.weighting == "terminal":
             terminal = np.array([state_weight])
-            return PlanCost(0.0 * state_weight, terminal, self._unit**2 * thrust_weight, absolute)
+            return PlanCost(0.0 * state_weight, terminal, self.unit**2 * thrust_weight, absolute)
         ticks_per_step = parameters.step / tick
         weights = Weights.scaled(state_weight, self._effort, tick)
         grid = model.period / intervals * np.arange(intervals)
@@ -194,13 +197,13 @@ class ModelPredictiveController(Controller[MpcParameters]):
         repeats = max(1, round(model.period / intervals / tick)) if intervals > 1 else 1
         terminal = periodic_cost_to_go([model.discretise(float(time), tick) for time in middles], repeats, weights)
         terminal *= weights.cost_unit / np.outer(weights.state_unit, weights.state_unit)
-        thrust = ticks_per_step * self._unit**2 * thrust_weight
+        thrust = ticks_per_step * self.unit**2 * thrust_weight
         return PlanCost(ticks_per_step * state_weight, terminal, thrust, absolute)
 
     def _make_constraints(self) -> tuple[ThrustBox, list[Constraint]]:
         """The thrust box and the other constraints, in descending priority for `clip`."""
-        parameters, steps, unit = self._parameters, self._steps, self._unit
-        limit: Vector = self._limit / unit
+        parameters, steps, unit = self._parameters, self._steps, self.unit
+        limit: Vector = self.limit / unit
         others: list[Constraint] = []
         if parameters.total_thrust > 0.0:
             total = TotalThrust(parameters.total_thrust, unit, steps)
@@ -255,10 +258,10 @@ class ModelPredictiveController(Controller[MpcParameters]):
         due = not len(self.plan) or time - self._planned_at >= self._replan_ns
         command = self._new_plan(estimate, target) if due else self._follow(time)
         force = command.force
-        for constraint in reversed(self._constraints):
+        for constraint in reversed(self.constraints):
             force = constraint.clip(force, time, target)
         if self._rate is not None:
-            self._rate.previous = np.clip(np.nan_to_num(force), -self._limit, self._limit)
+            self._rate.previous = np.clip(np.nan_to_num(force), -self.limit, self.limit)
         return replace(command, force=force * mass_ratio)
 
     def _step_at(self, time: int) -> int:
@@ -288,7 +291,7 @@ class ModelPredictiveController(Controller[MpcParameters]):
         gradient, cost_of_free_motion = qp.tracking(estimate, target, self._step_ns)
         inputs = PlanInputs(qp, estimate, target, self.plan)
         solution = self.solver.solve(inputs, gradient, 0.5 * qp.scale * cost_of_free_motion)
-        self.plan = self._unit * solution.forces
+        self.plan = self.unit * solution.forces
         self._planned_at = estimate.time
         return Command(self.plan[0], solution.status, solution.iterations, 2.0 * solution.cost / qp.scale)
 

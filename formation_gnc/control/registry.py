@@ -6,6 +6,7 @@ from formation_gnc.control.adaptive_lqr import AdaptiveLinearQuadraticRegulator
 from formation_gnc.control.asre import Asre
 from formation_gnc.control.coast import Coast
 from formation_gnc.control.controller import Controller
+from formation_gnc.control.dynamic_inversion import DynamicInversion
 from formation_gnc.control.finite_horizon import FiniteHorizonController
 from formation_gnc.control.gmpsp import GmpspController
 from formation_gnc.control.hinf import HInfinityController
@@ -16,6 +17,7 @@ from formation_gnc.control.mpsp import MpspController
 from formation_gnc.control.roe_lyapunov import RoeLyapunov
 from formation_gnc.control.sdre import Sdre
 from formation_gnc.control.sdre_finite import FiniteSdre
+from formation_gnc.control.sliding_mode import SlidingMode
 from formation_gnc.plugins import load_plugins
 
 ALGORITHMS: dict[str, type[Controller[Any]]] = {
@@ -28,6 +30,8 @@ ALGORITHMS: dict[str, type[Controller[Any]]] = {
     "sdre": Sdre,
     "sdre_finite": FiniteSdre,
     "asre": Asre,
+    "sliding_mode": SlidingMode,
+    "dynamic_inversion": DynamicInversion,
     "impulsive": Impulsive,
     "roe_lyapunov": RoeLyapunov,
     "adaptive_lqr": AdaptiveLinearQuadraticRegulator,

@@ -20,6 +20,13 @@ def require_along_track(vehicle: Vehicle) -> None:
         raise DesignError("thrust_limit along the track (y) is 0; it must be above 0 to control the drift")
 
 
+def require_in_plane(law: str, vehicle: Vehicle) -> None:
+    """Raise DesignError without a radial and an along-track thruster: three outputs take three inputs."""
+    limits = vehicle.thrust_limit[:2].tolist()
+    if not min(limits) > 0.0:
+        raise DesignError(f"{law}: thrust_limit in the orbit plane (x, y) is {limits}; both must be above 0")
+
+
 @dataclass(frozen=True)
 class QuadraticWeights:
     """Weights by Bryson's rule, each the deviation with unit cost, or as matrices.

@@ -277,7 +277,7 @@ def test_a_target_that_leaps_is_to_be_reached_anew() -> None:
             health,
             tick,
             target={"relative_state": far},
-            estimate={"relative_state": far + [off, 0.0, 0.0, 0.0, 0.0, 0.0]},
+            estimate={"relative_state": far + off * np.eye(6)[0]},
         )
     assert level(health, "control_error") is Level.FAILED
 

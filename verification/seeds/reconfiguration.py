@@ -14,7 +14,7 @@ from verification.seeds.accepted import Ours
 
 TICK, BEGIN, FINAL, END = 10.0, 4500.0, 4000.0, 10_500.0
 """s: ticks, when the target changes, the time for it, and when the flight is over."""
-LAWS = ("lqr", "adaptive_lqr", "sdre", "sdre_finite", "asre", "mpsp", "gmpsp")
+LAWS = ("lqr", "adaptive_lqr", "sdre", "sliding_mode", "dynamic_inversion", "sdre_finite", "asre", "mpsp", "gmpsp")
 
 
 def fly(law: str) -> tuple[Any, Any, set[str]]:
