@@ -13,7 +13,7 @@ from typing import Any
 import yaml
 
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.flight.graph import GRAPH, MODULES, PLANT
+from formation_gnc.flight.graph import DISPLAY, GRAPH, MODULES, PLANT, RECORDER
 from formation_gnc.limited_yaml import RejectedYamlError
 from formation_gnc.parameters import OWN_OF_ROS, dump, leaves, load, read_yaml
 from formation_gnc.plant.parameters import PlantParameters
@@ -28,7 +28,7 @@ ALL = "**"
 EXTENDS = "extends"
 """Key of the scenario that a file extends: its sections come first, and what the file gives goes before them."""
 
-RUN_NODES = (PLANT, "/recorder", "/display", "/replay")
+RUN_NODES = (PLANT, RECORDER, DISPLAY, "/replay")
 """Nodes that are one per run, some only when asked."""
 
 DEFAULT_DEPUTIES = next(each.default for each in fields(PlantParameters) if each.name == "deputies")
