@@ -120,7 +120,7 @@ def fly(scenario: Scenario, options: argparse.Namespace) -> int:
     if secure and options.in_process:
         raise ConfigurationError("--secure: is of the node graph alone; with --in-process there is no bus to secure")
     names = ("composed", "display", "respawn", "keystore")
-    on_graph = partial(_fly_on_graph, secure=secure, **{name: getattr(options, name) for name in names})
+    on_graph = partial(_fly_on_graph, how={name: getattr(options, name) for name in names} | {"secure": secure})
     try:
         speedup = (_fly_in_process if options.in_process else on_graph)(scenario, bag, console)
     except KeyboardInterrupt:
@@ -200,7 +200,7 @@ class _Display:
             self.say(message)
 
 
-def _fly_on_graph(scenario: Scenario, bag: Path, console: Console, **how: Any) -> float:
+def _fly_on_graph(scenario: Scenario, bag: Path, console: Console, how: dict[str, Any]) -> float:
     from formation_gnc.sil.report import Report
 
     need_ros("--in-process flies without")

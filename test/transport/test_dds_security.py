@@ -99,7 +99,7 @@ def test_what_is_in_no_table_is_denied_in_every_domain() -> None:
             assert grant.allows("publish", "ros_discovery_info", domain)
 
 
-def test_governance_lets_nobody_in_without_an_identity_nor_past_a_permission() -> None:
+def test_governance_lets_in_by_identity_and_permission_alone() -> None:
     (rule,) = ElementTree.fromstring(governance()).iterfind("domain_access_rules/domain_rule")
     assert domains(rule) == range(233)
     assert rule.findtext("allow_unauthenticated_participants") == "false"
