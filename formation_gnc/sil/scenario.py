@@ -16,6 +16,7 @@ from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight.graph import DISPLAY, GRAPH, MODULES, PLANT, RECORDER
 from formation_gnc.limited_yaml import RejectedYamlError
 from formation_gnc.parameters import OWN_OF_ROS, dump, leaves, load, read_yaml
+from formation_gnc.plain_file import read_plain
 from formation_gnc.plant.parameters import PlantParameters
 from formation_gnc.shipped import find_shipped
 from formation_gnc.sil.following import SHARED, departures, with_followed
@@ -257,7 +258,7 @@ def _extended(path: Path) -> list[Path]:
 def _read(path: Path) -> tuple[str | None, Sections]:
     """Name of the scenario that a file extends, if any, and its own sections in their order."""
     try:
-        base, sections = _parsed(path, path.read_bytes())
+        base, sections = _parsed(path, read_plain(path))
     except OSError as error:
         raise ConfigurationError(f"{path}: cannot be read ({error.strerror})") from None
     return base, list(sections)
