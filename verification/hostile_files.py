@@ -12,6 +12,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from typing import Any
 from formation_gnc.cli import main as command
 from formation_gnc.recording.reader import Bag
 from formation_gnc.sil.recorded_flight import fly
-from formation_gnc.sil.scenario import load_scenario
+from formation_gnc.sil.scenario import find_scenario, load_scenario
 from verification.hostile import bags, texts
 
 LONGEST, GIVEN_UP = 5.0, 60.0
@@ -187,6 +188,18 @@ def try_all(name: str, file: Path, whole: Path, commands: dict[str, list[str]], 
     return trial
 
 
+def _warm_up(whole: Path, out: Path) -> None:
+    """Let this process import and compile what its copies will run."""
+    scenario = find_scenario("leader_follower")
+    with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+        for number, arguments in enumerate(BAG_COMMANDS.values()):
+            command(filled(arguments, whole, whole, out / f"bag{number}"))
+        for number, arguments in enumerate(TEXT_COMMANDS.values()):
+            place = out / f"text{number}"
+            place.mkdir(parents=True, exist_ok=True)
+            command(filled(arguments, scenario, whole, place))
+
+
 def trials(names: Sequence[str] = ()) -> Iterator[tuple[str, Trial, str]]:
     """Try every file, or those named; yields which table it belongs to, its trial, and a path to leave out."""
     with tempfile.TemporaryDirectory(prefix="formation_gnc-verify-") as directory:
@@ -195,6 +208,7 @@ def trials(names: Sequence[str] = ()) -> Iterator[tuple[str, Trial, str]]:
         content, file = bags.Content.of(next(whole.glob("*.mcap"))), place / "chunks.mcap"
         content.write(file)  # a flight of a minute is one chunk
         assert Bag(file).remarks == []
+        _warm_up(whole, place / "warm")
         usual = try_all("whole", whole, whole, BAG_COMMANDS, {})
         assert not usual.shortcomings, usual.shortcomings
         expected = {name: answer.figures for name, answer in usual.answers.items()}
