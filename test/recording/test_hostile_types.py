@@ -76,10 +76,11 @@ def test_what_is_no_event_is_left_out_of_the_bag_and_counted(tmp_path: Path) -> 
     take = session.open_topic("/events", "formation_gnc_msgs/msg/Event", lambda: {b"1": "/plant"}, True)
     whole = to_cdr(Event(0, 0, "/plant", EventKind.WARNING, "x", [], "words"))
     about = {"stamp": 0, "publisher": b"1", "source_timestamp": 0}
-    for number, data in enumerate([whole, whole[:-9], b"", whole], 1):
+    more = to_cdr(Event(0, 0, "/plant", EventKind.WARNING, "x", [], "more words"))
+    for number, data in enumerate([whole, whole[:-9], b"", more], 1):
         take(data, about | {"publication_sequence_number": number})
     assert session.ignored == {"/events": 2}
     session.close()
     bag = Bag(tmp_path / "bag")
-    assert [data for _, data, _ in bag.messages()] == [whole, whole]
+    assert [data for _, data, _ in bag.messages()] == [whole, more]
     assert any("2 of /events" in remark for remark in bag.remarks)
