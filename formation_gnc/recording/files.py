@@ -1,7 +1,9 @@
 """Files of a bag: MCAP or sqlite3, plain or compressed as rosbag2 does it, in one directory or alone."""
 
+import sqlite3
 import tempfile
 from collections.abc import Callable
+from contextlib import closing, suppress
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -47,7 +49,16 @@ def _plain(path: Path) -> Path:
         check_plain(path)
     except OSError as error:
         raise BagError(f"{path}: cannot be read: {error.strerror}") from None
+    if path.suffix == ".db3" and _has_views(path):
+        raise BagError(f"{path}: has views, which can be without end; a bag has tables alone")
     return path
+
+
+def _has_views(path: Path) -> bool:
+    """Whether a sqlite3 file has tables that are made up as they are read."""
+    with suppress(sqlite3.Error), closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as database:
+        return bool(database.execute("SELECT name FROM sqlite_master WHERE type = 'view'").fetchall())
+    return False
 
 
 def digest_of(path: Path) -> str:

@@ -1,8 +1,10 @@
 """What could be read for ever, or unpacks to more than there is, is refused at once by whatever reads it."""
 
 import os
+import sqlite3
 import struct
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import lz4.frame
@@ -70,6 +72,17 @@ def test_an_endless_metadata_file_is_as_none(endless: Callable[[Path], object], 
     endless(tmp_path / "metadata.yaml")
     with pytest.raises(BagError, match="is not an MCAP file"):
         Bag(tmp_path)
+
+
+def test_a_database_of_an_endless_view_is_no_bag(tmp_path: Path) -> None:
+    with closing(sqlite3.connect(tmp_path / "bag.db3")) as database:
+        database.executescript(
+            "CREATE TABLE topics(id INTEGER); CREATE VIEW messages AS WITH RECURSIVE n(i) AS"
+            " (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT i AS id, 1 AS topic_id, i AS timestamp FROM n"
+        )
+    for read in (Bag, lambda path: recover(path, None)):
+        with pytest.raises(BagError, match="has views"):
+            read(tmp_path)
 
 
 def test_a_large_file_is_not_read_as_a_whole(tmp_path: Path) -> None:
