@@ -12,6 +12,7 @@ NODES = ["plant", "satellite", "display", "recorder", "replay"]
 # What a wheel asks for: newest versions that are tried are those of requirements.lock, oldest those given here.
 REQUIREMENTS = [
     "control>=0.10.1,<0.11",
+    "cryptography>=41",
     "dask>=2025.5",
     "distributed>=2025.5",
     "filterpy>=2,<3",

@@ -254,6 +254,14 @@ def to_json(value: Any) -> str:
     return json.dumps(value, default=lambda each: int.from_bytes(each) if isinstance(each, bytes) else _plain(each))
 
 
+def from_json(text: str) -> Any:
+    """A parameter's value from JSON; raises ValueError for what is none, or is nested too deeply."""
+    try:
+        return json.loads(text)
+    except RecursionError:
+        raise ValueError("nested too deeply") from None
+
+
 def _build[T](schema: type[T], checked: Mapping[str, Any], prefix: str) -> T:
     hints = get_type_hints(schema)
     fields: dict[str, Any] = {}

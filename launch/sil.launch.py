@@ -14,6 +14,7 @@ from launch_ros.actions import Node
 
 from formation_gnc.flight.graph import MODULES
 from formation_gnc.parameters import read_yaml
+from formation_gnc.transport.security import check_secured, variables
 from launch import LaunchContext, LaunchDescription
 
 ARGUMENTS = {
@@ -30,6 +31,7 @@ ARGUMENTS = {
     "seed": ("", "seed of the run; empty for the scenario's"),
     "duration": ("", "simulated time to fly, s; empty for the scenario's"),
     "controller": ("", "control law of every deputy; empty for the scenario's"),
+    "keystore": ("", "folder made by formation-gnc keystore: fly in its enclaves, or not at all"),
     "display": ("false", "markers and transforms for RViz and Foxglove"),
 }
 """Default and meaning of each argument."""
@@ -63,15 +65,20 @@ def nodes(context: LaunchContext) -> list[Node]:
     files = [str(path), *([given["params_file"]] if given["params_file"] else [])]
     for_all = ["--log-level", given["log_level"]] if given["log_level"] else []
     for_all += ["-p", "use_sim_time:=true"] if is_on["use_sim_time"] else []
+    keystore = Path(given["keystore"]) if given["keystore"] else None
+    enclaves = list[str]()
 
     def node(executable: str, deputy: str = "", own: dict[str, str] | None = None, **options: object) -> Node:
         values = [f"{name}:={value}" for name, value in (own or {}).items() if value]
+        namespace = "/".join(filter(None, (given["namespace"].strip("/"), deputy)))
+        enclaves.append("/".join(("", *filter(None, (namespace, executable)))))
         return Node(
             package="formation_gnc",
             executable=executable,
-            namespace="/".join(filter(None, (given["namespace"], deputy))),
+            namespace=namespace,
             parameters=files,
-            ros_arguments=[*for_all, *(word for value in values for word in ("-p", value))],
+            ros_arguments=["--enclave", enclaves[-1], *for_all, *(word for value in values for word in ("-p", value))],
+            additional_env=variables(keystore) if keystore else {},
             output="screen",
             **options,
         )
@@ -90,6 +97,8 @@ def nodes(context: LaunchContext) -> list[Node]:
             started.append(node("satellite", deputy, law, **again))
         else:
             started += [node(name, deputy, law if name == "controller" else {}, **again) for name in MODULES]
+    if keystore:
+        check_secured(keystore, enclaves)  # raises before anything is started
     return started
 
 

@@ -20,8 +20,12 @@ import yaml
 
 import formation_gnc
 from formation_gnc import records
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.flight.access import access_by_process
 from formation_gnc.messages.conversion import type_name
 from formation_gnc.sil.scenario import load_scenario
+from formation_gnc.transport import security
+from formation_gnc.transport.keystore import make_keystore
 
 ROOT = Path(__file__).resolve().parents[1]
 NODES = {"plant", "navigation", "guidance", "controller", "supervisor", "recorder"}
@@ -95,7 +99,7 @@ def test_versions_agree():
         assert statement.format(formation_gnc.__version__) in (ROOT / name).read_text(), name
 
 
-IN_DISTRIBUTIONS = {"matplotlib", "numba", "numpy", "rich", "scipy", "yaml"}
+IN_DISTRIBUTIONS = {"cryptography", "matplotlib", "numba", "numpy", "rich", "scipy", "yaml"}
 """Modules of packages that rosdep installs from a distribution (rosdistro, rosdep/python.yaml)."""
 
 BY_PIP = {"control", "filterpy", "lz4", "mcap", "osqp", "plotly", "pymsis", "rosbags", "skyfield", "zstandard"}
@@ -340,13 +344,40 @@ def test_launch_arguments_reach_the_nodes_that_they_are_for(launch_double):
     words = {node.executable: " ".join(node.ros_arguments) for node in nodes}
     assert set(words) == NODES | {"display"}
     for each in words.values():
-        assert each.startswith("--log-level warn -p use_sim_time:=true")
+        assert "--log-level warn -p use_sim_time:=true" in each
     assert words["plant"].endswith("-p wait_for_recorder:=true -p seed:=7 -p duration:=90.0")
     assert words["recorder"].endswith("-p bag:=bags/x")
     assert words["controller"].endswith("-p algorithm:=mpc")
     assert [name for name, each in words.items() if "mpc" in each] == ["controller"]
     assert {node.namespace for node in nodes} == {"alpha", "alpha/deputy1"}
     assert {node.executable for node in nodes if getattr(node, "respawn", False)} == NODES - {"plant", "recorder"}
+
+
+@pytest.mark.parametrize("namespace", ["", "alpha"])
+def test_launch_file_flies_every_node_in_its_enclave_or_none(launch_double, namespace, tmp_path, monkeypatch):
+    formation = f"/{namespace}" if namespace else ""
+    keystore = tmp_path / "keys"
+    make_keystore(keystore, access_by_process(["deputy1"], formation))
+    tried = []
+    monkeypatch.setattr(security.subprocess, "run", lambda command, **_: tried.append(command) or done)
+    done = subprocess.CompletedProcess([], 0)
+    nodes = started(launch_double, namespace=namespace, keystore=str(keystore), display="true")
+    assert {node.executable for node in nodes} == NODES | {"display"}
+    assert len(tried) == 1
+    for node in nodes:
+        place = "/".join(("", *filter(None, (node.namespace, node.executable))))
+        assert node.ros_arguments[:2] == ["--enclave", place]
+        assert node.additional_env == security.variables(keystore)
+    done = subprocess.CompletedProcess([], 2, "no security libraries")
+    with pytest.raises(ConfigurationError, match="nothing flies"):
+        started(launch_double, namespace=namespace, keystore=str(keystore))
+    shutil.rmtree(keystore / f"enclaves{formation}/deputy1/satellite")
+    with pytest.raises(ConfigurationError, match=f"enclave {formation}/deputy1/satellite lacks"):
+        started(launch_double, namespace=namespace, keystore=str(keystore), use_composition="true")
+
+
+def test_launch_file_leaves_security_to_the_environment_without_a_keystore(launch_double):
+    assert [node.additional_env for node in started(launch_double)] == [{}] * len(NODES)
 
 
 @needs_set_up

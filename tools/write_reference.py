@@ -10,7 +10,8 @@ from typing import Any
 from formation_gnc.common import CommonParameters
 from formation_gnc.control.controller_manager import ControllerParameters
 from formation_gnc.flight import topics
-from formation_gnc.flight.graph import COMMAND, GRAPH, MODULES
+from formation_gnc.flight.access import NODES_OF_RUN, OF_EVERY_NODE
+from formation_gnc.flight.graph import COMMAND, GRAPH, MODULES, RECORDER
 from formation_gnc.flight.topics import Topic
 from formation_gnc.guidance.parameters import GuidanceParameters
 from formation_gnc.navigation.parameters import NavigationParameters
@@ -189,38 +190,20 @@ def _takers(topic: Topic) -> list[str]:
 
 def nodes_table() -> str:
     """Table of what every node subscribes to and publishes."""
-    of_every_deputy = "{} of every deputy"
     rows = [
-        (
-            "/plant",
-            [of_every_deputy.format(_code(COMMAND)), _code(topics.PROGRESS)],
-            [
-                *map(_code, (topics.CLOCK, topics.TRUTH)),
-                of_every_deputy.format(_code(topics.MEASUREMENT)),
-                *map(_code, (topics.EVENTS, topics.DIAGNOSTICS)),
-            ],
-        )
+        (name, list(map(_on_run, node.takes)), list(map(_on_run, node.gives))) for name, node in NODES_OF_RUN.items()
     ]
     for row in GRAPH:
         takes = [_code(each.topic) for each in row.takes]
         takes += [f"of the tick before {_code(each.topic)}" for each in row.takes_of_before]
         takes += [f"in a fleet {_code(each.topic)} of every other deputy" for each in row.takes_of_others]
         gives = [f"in a fleet {_code(topic)}" if topic.fleet_only else _code(topic) for topic in row.gives]
-        rows.append((row.name, takes, [*gives, *map(_code, (topics.TIMING, topics.EVENTS))]))
-    transforms = f"{_code(topics.TF)}, or {_code(topics.TRANSFORMS)} where tf2_msgs is not installed"
-    rows += [
-        (
-            "/display",
-            [_code(topics.TRUTH), of_every_deputy.format(_code(topics.TARGET))],
-            [_code(topics.MARKERS), transforms],
-        ),
-        ("/recorder", ["every topic there is, as raw bytes"], [_code(topics.PROGRESS)]),
-        (
-            "/replay",
-            [f"{_code(COMMAND)} of every deputy whose {_code(topics.MEASUREMENT)} it plays"],
-            ["the topics of a bag", _code(topics.CLOCK)],
-        ),
-    ]
+        rows.append((row.name, takes, [*gives, _code(topics.TIMING)]))
+    rows.append((RECORDER, ["every topic there is, as raw bytes"], [_code(topics.PROGRESS)]))
+    of_all = list(map(_code, OF_EVERY_NODE))
+    rows = [(name, takes, [*gives, *of_all]) for name, takes, gives in rows]
+    played = f"{_code(COMMAND)} of every deputy whose {_code(topics.MEASUREMENT)} it plays"
+    rows.append(("/replay", [played], ["the topics of a bag", *map(_code, (topics.CLOCK, *OF_EVERY_NODE))]))
     lines = ["| node | subscribes to | publishes |", "|---|---|---|"]
     return "\n".join(
         [*lines, *(f"| `{name}` | {', '.join(takes)} | {', '.join(gives)} |" for name, takes, gives in rows)]
@@ -234,6 +217,12 @@ def topics_table() -> str:
         message, frame = (topic.record.message, topic.record.frame_id) if topic.record else (topic.message, "")
         lines.append(f"| `{topic.name}` | {_linked(message)} | {frame} | {topic.when} | {topic.contents} |")
     return "\n".join(lines)
+
+
+def _on_run(topic: Topic) -> str:
+    """A topic of a node of the run: a deputy's is that of every one."""
+    where = " where tf2_msgs is not installed" if topic is topics.TRANSFORMS else ""
+    return f"{_code(topic)}{where}" if topic.name.startswith("/") else f"{_code(topic)} of every deputy"
 
 
 def _code(topic: Topic) -> str:

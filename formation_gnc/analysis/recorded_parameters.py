@@ -1,18 +1,18 @@
 """Parameters that a bag's metadata say its nodes started with."""
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
 from formation_gnc.common import FIRST_EPOCH, LAST_EPOCH
 from formation_gnc.flight.graph import PLANT
+from formation_gnc.parameters import from_json
 from formation_gnc.recording.provenance import parameters_record
 
 
 def recorded_number(metadata: Mapping[str, Mapping[str, Any]], node: str, name: str) -> float | None:
     """A node's parameter at its start; None where the bag does not have it as a number."""
     try:
-        return float(json.loads(metadata[parameters_record(node)][name]))
+        return float(from_json(metadata[parameters_record(node)][name]))
     except (KeyError, ValueError, TypeError):
         return None
 

@@ -15,6 +15,7 @@ from formation_gnc.campaign.requirement import Requirement, requirement_of
 from formation_gnc.errors import ConfigurationError, nearest
 from formation_gnc.limited_yaml import RejectedYamlError
 from formation_gnc.parameters import read_yaml
+from formation_gnc.plain_file import read_plain
 from formation_gnc.randomness import generator
 from formation_gnc.shipped import find_shipped
 from formation_gnc.sil.overrides import address_of
@@ -97,7 +98,7 @@ def load_campaign(path: Path, runs: int | None = None, scenario: Path | None = N
         ConfigurationError: the file cannot be read, is no campaign, or says what is not allowed.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_plain(path).decode()
     except OSError as error:
         raise ConfigurationError(f"{path}: cannot be read ({error.strerror})") from None
     except UnicodeDecodeError:

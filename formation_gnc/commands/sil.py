@@ -87,6 +87,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="replay the run, write its page, which tells whether that gave the same bits, and on a desktop open it",
     )
+    parser.add_argument(
+        "--secure", action="store_true", help="fly in enclaves, with keys made for this flight alone; not without"
+    )
+    parser.add_argument(
+        "--keystore",
+        metavar="DIR",
+        type=Path,
+        help="fly in the enclaves of `formation-gnc keystore`, in this directory",
+    )
     parser.add_argument("--respawn", action="store_true", help="start a deputy's node again when it has died")
     parser.add_argument(
         "--accept-lost", action="store_true", help="exit with status 0 also when the formation is lost or given up"
@@ -107,7 +116,11 @@ def fly(scenario: Scenario, options: argparse.Namespace) -> int:
     console = Console(stderr=True, highlight=False)
     for warning in warnings(scenario):
         console.print(f"warning: {warning}", soft_wrap=True)
-    on_graph = partial(_fly_on_graph, composed=options.composed, display=options.display, respawn=options.respawn)
+    secure = options.secure or options.keystore is not None
+    if secure and options.in_process:
+        raise ConfigurationError("--secure: is of the node graph alone; with --in-process there is no bus to secure")
+    names = ("composed", "display", "respawn", "keystore")
+    on_graph = partial(_fly_on_graph, how={name: getattr(options, name) for name in names} | {"secure": secure})
     try:
         speedup = (_fly_in_process if options.in_process else on_graph)(scenario, bag, console)
     except KeyboardInterrupt:
@@ -187,9 +200,7 @@ class _Display:
             self.say(message)
 
 
-def _fly_on_graph(
-    scenario: Scenario, bag: Path, console: Console, composed: bool, display: bool, respawn: bool
-) -> float:
+def _fly_on_graph(scenario: Scenario, bag: Path, console: Console, how: dict[str, Any]) -> float:
     from formation_gnc.sil.report import Report
 
     need_ros("--in-process flies without")
@@ -201,7 +212,7 @@ def _fly_on_graph(
         shown.show(report.message, report.figures.get("tick", 0.0), report.figures.get("speedup", 0.0))
 
     with _Display(console, scenario.plant.ticks) as shown:
-        options = LaunchOptions(bag.absolute(), composed, display, respawn)
+        options = LaunchOptions(bag.absolute(), **how)
         last = fly_graph(scenario, options, show, shown.say)
         return last.figures.get("speedup", 0.0)
 

@@ -71,8 +71,8 @@ class Row:
         return self.gives[0]
 
 
-PLANT = "/plant"
-"""Full name of the plant's node."""
+PLANT, RECORDER, DISPLAY = "/plant", "/recorder", "/display"
+"""Full names of the nodes of a run, of which there is one."""
 
 NAVIGATION_STATE = Input(topics.ESTIMATE, NavigationState)
 MODE = Input.whole(topics.MODE)

@@ -15,6 +15,7 @@ from formation_gnc.interchange.tle import read_tle
 from formation_gnc.orbit.elements import Elements, elements_from_state
 from formation_gnc.orbit.frames import relative_from_inertial
 from formation_gnc.orbit.propagation import Propagator
+from formation_gnc.plain_file import check_plain
 from formation_gnc.types import Vector
 
 LARGEST_FILE = 100_000_000
@@ -50,6 +51,7 @@ def read_orbits(paths: Sequence[Path]) -> list[OrbitSource]:
     """
     found: list[OrbitSource] = []
     for path in paths:
+        check_plain(path)
         if path.stat().st_size > LARGEST_FILE:
             raise ConfigurationError(f"{path}: has {path.stat().st_size} bytes; at most {LARGEST_FILE} are allowed")
         try:

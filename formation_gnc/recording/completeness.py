@@ -1,12 +1,12 @@
 """Ticks that a run's topics lack."""
 
-import json
 from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from formation_gnc.flight import topics
+from formation_gnc.parameters import from_json
 from formation_gnc.recording.provenance import parameters_record
 from formation_gnc.types import NANOSECONDS
 
@@ -30,7 +30,7 @@ def tick_of(metadata: Mapping[str, Mapping[str, str]], stamps: Stamps) -> int:
     """
     steps = np.diff(np.unique(stamps)).astype(np.int64)
     try:
-        tick = round(float(json.loads(metadata[parameters_record("/plant")]["tick"])) * NANOSECONDS)
+        tick = round(float(from_json(metadata[parameters_record("/plant")]["tick"])) * NANOSECONDS)
     except (KeyError, ValueError, TypeError, OverflowError):
         tick = 0
     if tick > 0 and not np.any(steps % tick):

@@ -16,6 +16,9 @@ from formation_gnc.types import NANOSECONDS
 
 HEADER, TIME, CLOCK = "std_msgs/msg/Header", "builtin_interfaces/msg/Time", "rosgraph_msgs/msg/Clock"
 
+MOST_VALUES = 1_000_000
+"""Most values that a type gives each of its messages: arrays of fixed length, nested ones too."""
+
 LAYOUTS_KEPT = 64
 """Layouts kept for each message length; free text gives ever new ones."""
 
@@ -37,13 +40,15 @@ class MessageType:
         self._layouts: dict[tuple[bytes, int], list[CdrLayout]] = {}
         self._store = get_typestore(Stores.EMPTY)
         try:
-            self._store.register(parsers[encoding](schema.decode()))
+            types = parsers[encoding](schema.decode())
+            _check_size(types, name)
+            self._store.register(types)
             self._definitions: dict[str, Sequence[FieldDefinition]] = {
                 type_name: fields for type_name, (_, fields) in self._store.fielddefs.items()
             }
             if name not in self._definitions:
                 raise KeyError(name)
-        except (TypesysError, UnicodeDecodeError, KeyError, ValueError) as error:
+        except (TypesysError, UnicodeDecodeError, KeyError, ValueError, RecursionError) as error:
             raise BagError(f"message type {name!r}: its schema cannot be read: {error}") from None
 
     @property
@@ -132,6 +137,31 @@ class MessageType:
 
     def _misfit(self, reason: Exception) -> BagError:
         return BagError(f"message type {self.name!r}: a message does not fit it: {reason}")
+
+
+def _check_size(types: Mapping[str, tuple[Any, Sequence[FieldDefinition]]], name: str) -> None:
+    """Raise ValueError for a type that contains itself, or whose messages have more values than a message may."""
+    values: dict[str, int] = {}
+
+    def of_type(name: str, above: tuple[str, ...]) -> int:
+        if name in above:
+            raise ValueError(f"{name} contains itself")
+        if name not in values and name in types:
+            values[name] = sum(of_field(field, (*above, name)) for _, field in types[name][1])
+        if values.get(name, 0) > MOST_VALUES:
+            raise ValueError(f"{name} has {values[name]} values, must be at most {MOST_VALUES}")
+        return values.get(name, 1)
+
+    def of_field(field: Any, above: tuple[str, ...]) -> int:
+        kind, detail = field
+        if kind == Nodetype.NAME:
+            return of_type(detail, above)
+        if kind == Nodetype.BASE:
+            return 1
+        inner, size = detail
+        return of_field(inner, above) * (size if kind == Nodetype.ARRAY else 1)
+
+    of_type(name, ())
 
 
 def installed_type(name: str) -> MessageType:

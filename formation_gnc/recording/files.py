@@ -1,7 +1,9 @@
 """Files of a bag: MCAP or sqlite3, plain or compressed as rosbag2 does it, in one directory or alone."""
 
+import sqlite3
 import tempfile
 from collections.abc import Callable
+from contextlib import closing, suppress
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -11,11 +13,15 @@ import zstandard
 
 from formation_gnc.errors import BagError
 from formation_gnc.limited_yaml import load_limited
-from formation_gnc.recording.mcap_file import McapFile, file_number
+from formation_gnc.plain_file import check_plain, read_plain
+from formation_gnc.recording.mcap_file import LARGEST_CHUNK, McapFile, file_number
 from formation_gnc.recording.stored_file import StoredFile
 
 COMPRESSED = ".zstd"
 SUFFIXES = (".mcap", ".db3")
+
+UNPACKED = 200
+"""Times its size that a file may unpack to."""
 
 _SQLITE = b"SQLite format 3\0"
 _ZSTD = b"\x28\xb5\x2f\xfd"
@@ -30,11 +36,29 @@ def bag_files(path: Path) -> list[Path]:
     if not path.is_dir():
         if not path.exists():
             raise BagError(f"{path}: no such bag")
-        return [path]
+        return [_plain(path)]
     files = [file for file in path.iterdir() if Path(file.name.removesuffix(COMPRESSED)).suffix in SUFFIXES]
     if not files:
         raise BagError(f"{path}: holds no .mcap or .db3 file")
-    return sorted(files, key=lambda file: (file_number(file.name.partition(".")[0]), file.name))
+    return sorted(map(_plain, files), key=lambda file: (file_number(file.name.partition(".")[0]), file.name))
+
+
+def _plain(path: Path) -> Path:
+    """A path, of what can be read to its end."""
+    try:
+        check_plain(path)
+    except OSError as error:
+        raise BagError(f"{path}: cannot be read: {error.strerror}") from None
+    if path.suffix == ".db3" and _has_views(path):
+        raise BagError(f"{path}: has views, which can be without end; a bag has tables alone")
+    return path
+
+
+def _has_views(path: Path) -> bool:
+    """Whether a sqlite3 file has tables that are made up as they are read."""
+    with suppress(sqlite3.Error), closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as database:
+        return bool(database.execute("SELECT name FROM sqlite_master WHERE type = 'view'").fetchall())
+    return False
 
 
 def digest_of(path: Path) -> str:
@@ -95,7 +119,11 @@ def _unpacked(path: Path, unpack: Callable[[bytes], bytes] | None) -> StoredFile
     copy = Path(directory.name) / path.name.removesuffix(COMPRESSED)
     try:
         with path.open("rb") as source, copy.open("wb") as target:
-            zstandard.ZstdDecompressor().copy_stream(source, target)
+            left = UNPACKED * path.stat().st_size + LARGEST_CHUNK
+            for part in zstandard.ZstdDecompressor().read_to_iter(source):
+                left -= target.write(part)
+                if left < 0:
+                    raise BagError(f"{path}: unpacks to more than {UNPACKED} times its size")
     except zstandard.ZstdError as error:
         raise BagError(f"{path}: cannot be decompressed ({error})") from None
     except OSError as error:
@@ -105,12 +133,16 @@ def _unpacked(path: Path, unpack: Callable[[bytes], bytes] | None) -> StoredFile
     return file
 
 
+def _is_bounded(data: bytes) -> bool:
+    return zstandard.frame_content_size(data) <= LARGEST_CHUNK
+
+
 def _decompressed(data: bytes) -> bytes:
     """A message of a bag that compresses each; as it is where it is plain after all, empty where it is damaged."""
     if not data.startswith(_ZSTD):
         return data
     try:
-        return zstandard.ZstdDecompressor().decompressobj().decompress(data)
+        return zstandard.ZstdDecompressor().decompressobj().decompress(data) if _is_bounded(data) else b""
     except zstandard.ZstdError:
         return b""
 
@@ -118,7 +150,7 @@ def _decompressed(data: bytes) -> bytes:
 def _metadata(path: Path) -> dict[str, Any]:
     """Contents of the bag's metadata.yaml; empty where there is none that can be read."""
     try:
-        document = load_limited((path / "metadata.yaml").read_text(encoding="utf-8"))
+        document = load_limited(read_plain(path / "metadata.yaml").decode())
     except (OSError, ValueError, yaml.YAMLError):
         return {}
     information = document.get("rosbag2_bagfile_information") if isinstance(document, dict) else None

@@ -7,6 +7,7 @@ from io import SEEK_END, BytesIO
 from pathlib import Path
 from typing import BinaryIO
 
+import lz4.frame
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile, McapError
@@ -31,6 +32,12 @@ UNREADABLE = (
     zstandard.ZstdError,
 )
 """Exceptions of the MCAP and compression libraries on damaged bytes."""
+
+LARGEST_CHUNK = 1 << 28
+"""Most bytes that a chunk may unpack to: hundreds of times those that writers make."""
+
+LZ4_RATIO = 255
+"""Most that LZ4 unpacks a byte to."""
 
 _RECORD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
@@ -259,7 +266,14 @@ def verified_summary(stream: BinaryIO) -> Summary | None:
 
 
 def chunk_content(chunk: Chunk) -> bytes:
-    """Decompressed records of a chunk after its checksum is verified; raises one of UNREADABLE."""
+    """Decompressed records of a chunk after its checksum is verified; raises one of UNREADABLE, for a huge one too."""
+    size = chunk.uncompressed_size
+    if chunk.compression == "zstd":
+        size = max(size, zstandard.frame_content_size(chunk.data))
+    elif chunk.compression == "lz4":
+        size = max(size, lz4.frame.get_frame_info(chunk.data)["content_size"] or LZ4_RATIO * len(chunk.data))
+    if size > LARGEST_CHUNK:
+        raise ValueError(f"chunk of {size} bytes, must be at most {LARGEST_CHUNK}")
     stream, length = get_chunk_data_stream(chunk, validate_crc=True)
     return stream.read(length)
 
@@ -283,6 +297,8 @@ def chunk_records(content: bytes) -> Iterator[Message | Schema | Channel]:
             yield Schema.read(ReadDataStream(BytesIO(content[body:offset])))
         elif opcode == Opcode.CHANNEL:
             yield Channel.read(ReadDataStream(BytesIO(content[body:offset])))
+        elif not opcode:
+            raise ValueError("record of unknown kind 0")
 
 
 def chunk_messages(content: bytes, channels: Collection[int]) -> list[tuple[int, bytes, int]]:

@@ -26,7 +26,7 @@ from mcap.records import (
 )
 from numpy.typing import NDArray
 
-from formation_gnc.recording.mcap_file import MAGIC, UNREADABLE, chunk_content, chunk_records
+from formation_gnc.recording.mcap_file import LARGEST_CHUNK, MAGIC, UNREADABLE, chunk_content, chunk_records
 
 _RECORD = struct.Struct("<BQ")
 _CHUNK = struct.Struct("<QQQII")  # first and last stamp, size, checksum, length of the compression's name
@@ -219,13 +219,15 @@ def _decompressed(chunk: Chunk) -> bytes:
         decompress = lz4.frame.LZ4FrameDecompressor().decompress
     else:
         return b""
-    content = b""
+    content = bytearray()
     try:
         for start in range(0, len(chunk.data), _BLOCK):
+            if len(content) > LARGEST_CHUNK:
+                return b""  # no chunk of a recorder's
             content += decompress(chunk.data[start : start + _BLOCK])
     except (zstandard.ZstdError, RuntimeError, EOFError):
         pass  # the readable part ends here
-    return content
+    return bytes(content)
 
 
 def first_chunk(block: bytes) -> int | None:

@@ -1,7 +1,7 @@
 """Recording of a run: messages, losses, progress and parameters."""
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
 from typing import Any
 
 from formation_gnc.errors import ConfigurationError
@@ -55,6 +55,7 @@ class RecordingSession:
         self._write = self._snapshot.write if self._snapshot else bag.write
         self._losses: dict[str, LossCounter] = {}
         self._receptions: dict[str, Reception[bytes]] = {}
+        self._misfits: Counter[str] = Counter()
         self._said = [0, 0]
         self._received = True
 
@@ -89,12 +90,15 @@ class RecordingSession:
                 loss.take(number)
             if node and number == 1 and count > 1:
                 self.parameters.restarted(node, stamp)
+            if is_events:
+                try:
+                    self.progress.take_event(self._decode_event(data))
+                except ConfigurationError:  # no event at all
+                    self._misfits[topic] += 1
+                    return
             self._write(topic, data, stamp, number or count)
             if concerns_progress:
                 self.progress.take(topic, stamp, lambda: len(publishers()))
-            elif is_events:
-                with suppress(ConfigurationError):  # recorded as it is
-                    self.progress.take_event(self._decode_event(data))
             if is_clock and count % REPORT_TICKS == 0:
                 self.report_progress()
 
@@ -160,8 +164,9 @@ class RecordingSession:
 
     @property
     def ignored(self) -> dict[str, int]:
-        """Messages of other publishers left out so far by topic, where there are any."""
-        return {topic: each.lock.ignored for topic, each in self._receptions.items() if each.lock.ignored}
+        """Messages left out so far by topic: of other publishers, and on `/events` those that are no events."""
+        locked = {topic: each.lock.ignored for topic, each in self._receptions.items() if each.lock.ignored}
+        return locked | self._misfits
 
     @property
     def lost(self) -> int:

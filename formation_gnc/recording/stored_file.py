@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from formation_gnc.errors import BagError
 from formation_gnc.flight import topics
-from formation_gnc.recording.decode import CLOCK, MessageType, installed_type
+from formation_gnc.messages.definitions import schema_text
+from formation_gnc.recording.decode import CLOCK, MessageType
 from formation_gnc.types import NANOSECONDS
 
 OWN_PACKAGE = "formation_gnc_msgs/"
@@ -48,7 +49,6 @@ class Series(NamedTuple):
         return self.type_name.startswith(OWN_PACKAGE) or (self.topic, self.type_name) == (topics.CLOCK.name, CLOCK)
 
 
-@lru_cache(maxsize=256)
 def type_of(series: Series) -> MessageType:
     """Message type of a series, by the definition in the bag, else by the installed one of its name.
 
@@ -58,10 +58,16 @@ def type_of(series: Series) -> MessageType:
     if series.message_encoding != "cdr":
         raise BagError(f"messages are {series.message_encoding or 'of no encoding'}, not CDR")
     if series.schema:
-        return MessageType(series.type_name, series.schema, series.schema_encoding)
+        return _defined_type(series.type_name, series.schema, series.schema_encoding)
     if not series.type_name:
         raise BagError("has no message definition")
-    return installed_type(series.type_name)
+    return _defined_type(series.type_name, schema_text(series.type_name).encode(), "ros2msg")
+
+
+@lru_cache(maxsize=256)
+def _defined_type(name: str, schema: bytes, encoding: str) -> MessageType:
+    """A message type, parsed once however many topics have it; raises BagError."""
+    return MessageType(name, schema, encoding)
 
 
 class BagMessage(NamedTuple):

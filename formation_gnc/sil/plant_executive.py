@@ -6,7 +6,7 @@ from typing import Any, Protocol
 from formation_gnc.errors import RecorderLostError
 from formation_gnc.flight import topics
 from formation_gnc.flight.barrier import Decision
-from formation_gnc.flight.graph import COMMAND, GRAPH, commanding
+from formation_gnc.flight.graph import COMMAND, GRAPH, RECORDER, commanding
 from formation_gnc.flight.sources import is_shared, names_of, shared
 from formation_gnc.plant.parameters import PlantParameters
 from formation_gnc.records import Thrust
@@ -18,8 +18,6 @@ CHECK_PERIOD = 0.05
 
 REPORT_PERIOD = 0.5
 """Wall time (s) between reports."""
-
-RECORDER = "/recorder"
 
 CONTRADICTIONS = 3
 """Contradicting answers of a deputy that show two commanders; one that is started again may contradict itself once."""

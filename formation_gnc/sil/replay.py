@@ -9,7 +9,6 @@ started with then, `parameters NODE from STAMP`.
 The truth is recorded, not flown: changed modules say what they would have commanded, and nothing answers them.
 """
 
-import json
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from time import perf_counter
@@ -18,7 +17,7 @@ from typing import Any
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import MODULES, ModuleInstance, Row, missing, modules_named
-from formation_gnc.parameters import OWN_OF_ROS, load
+from formation_gnc.parameters import OWN_OF_ROS, from_json, load
 from formation_gnc.recording.provenance import parameters_record
 from formation_gnc.recording.reader import Bag
 from formation_gnc.records import EstimateStatus, Event, EventKind, Timing
@@ -79,8 +78,16 @@ class ReplayedModule:
             if changes in due:
                 due.remove(changes)  # the schedule brings it about by itself
             else:
-                module.commit(module.stage({name: json.loads(text) for name, text in changes.items()}))
+                module.commit(module.stage(_values(swap, changes)))
         return self.instance.respond(inputs)
+
+
+def _values(swap: Event, changes: Mapping[str, str]) -> dict[str, Any]:
+    """New values of a recorded change; raises ConfigurationError for values that are no JSON."""
+    try:
+        return {name: from_json(text) for name, text in changes.items()}
+    except ValueError as error:
+        raise ConfigurationError(f"{swap.node}: a change recorded at tick {swap.tick} is no JSON ({error})") from None
 
 
 def parameters_of(bag: Bag, node: str, start: int | None = None) -> dict[str, Any]:
@@ -91,7 +98,7 @@ def parameters_of(bag: Bag, node: str, start: int | None = None) -> dict[str, An
     """
     recorded = bag.metadata.get(parameters_record(node, start), {})
     try:
-        return {name: json.loads(text) for name, text in recorded.items() if not name.startswith(OWN_OF_ROS)}
+        return {name: from_json(text) for name, text in recorded.items() if not name.startswith(OWN_OF_ROS)}
     except ValueError as error:
         raise ConfigurationError(f"{bag.path}: recorded parameters of {node} are no JSON ({error})") from None
 

@@ -13,9 +13,10 @@ from typing import Any
 import yaml
 
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.flight.graph import GRAPH, MODULES, PLANT
+from formation_gnc.flight.graph import DISPLAY, GRAPH, MODULES, PLANT, RECORDER
 from formation_gnc.limited_yaml import RejectedYamlError
 from formation_gnc.parameters import OWN_OF_ROS, dump, leaves, load, read_yaml
+from formation_gnc.plain_file import read_plain
 from formation_gnc.plant.parameters import PlantParameters
 from formation_gnc.shipped import find_shipped
 from formation_gnc.sil.following import SHARED, departures, with_followed
@@ -28,7 +29,7 @@ ALL = "**"
 EXTENDS = "extends"
 """Key of the scenario that a file extends: its sections come first, and what the file gives goes before them."""
 
-RUN_NODES = (PLANT, "/recorder", "/display", "/replay")
+RUN_NODES = (PLANT, RECORDER, DISPLAY, "/replay")
 """Nodes that are one per run, some only when asked."""
 
 DEFAULT_DEPUTIES = next(each.default for each in fields(PlantParameters) if each.name == "deputies")
@@ -257,7 +258,7 @@ def _extended(path: Path) -> list[Path]:
 def _read(path: Path) -> tuple[str | None, Sections]:
     """Name of the scenario that a file extends, if any, and its own sections in their order."""
     try:
-        base, sections = _parsed(path, path.read_bytes())
+        base, sections = _parsed(path, read_plain(path))
     except OSError as error:
         raise ConfigurationError(f"{path}: cannot be read ({error.strerror})") from None
     return base, list(sections)

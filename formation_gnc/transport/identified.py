@@ -17,6 +17,9 @@ from formation_gnc.flight.reception import Information
 UNNUMBERED = 2**64 - 1
 """Sequence number of a middleware that has none."""
 
+_RETIRED: list["IdentifiedSubscription"] = []
+"""Those that were destroyed: the executor may still ask one for a message that it had noticed, by an address."""
+
 _TAKEN = 0
 _NONE_THERE = 401  # RCL_RET_SUBSCRIPTION_TAKE_FAILED
 
@@ -84,7 +87,7 @@ class IdentifiedSubscription(Waitable):  # type: ignore[misc]
         check_is_valid_msg_type(kind)
         with node.handle:
             self.handle = rclpy_implementation.Subscription(node.handle, kind, topic, profile.get_c_qos_profile())
-        self._node, self._callback = node, callback
+        self._node, self._callback, self._is_retired = node, callback, False
         self._buffer, self._info = _Buffer(allocator=_default_allocator()), _MessageInfo()
         addresses = self.handle.pointer, ctypes.addressof(self._buffer), ctypes.addressof(self._info)
         self._arguments = *map(ctypes.c_void_p, addresses), None
@@ -108,7 +111,7 @@ class IdentifiedSubscription(Waitable):  # type: ignore[misc]
 
     def is_ready(self, _wait_set: Any) -> bool:
         """Take a message; the executor asks once for each, and after a burst lets timers have their turn."""
-        message = self.take()
+        message = None if self._is_retired else self.take()
         if message is not None:
             self._callback(*message)
         return False
@@ -129,6 +132,8 @@ class IdentifiedSubscription(Waitable):  # type: ignore[misc]
 
     def destroy(self) -> None:
         """Unsubscribe."""
+        self._is_retired = True
+        _RETIRED.append(self)
         for each in self._waitables:
             self._node.remove_waitable(each)
         for handler in self._waitables[1:]:

@@ -1,22 +1,27 @@
 """Reads the parameters of other nodes through the standard services."""
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 from rcl_interfaces.msg import ParameterType
+from rcl_interfaces.srv import GetParameters, ListParameters
+from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
-from rclpy.parameter_client import AsyncParameterClient
 from rclpy.task import Future
 
 
 class ParameterReader:
-    """Asks nodes for all their parameters, without waiting for the answer."""
+    """Asks nodes for all their parameters, without waiting for the answer.
+
+    It has no client of a service that changes anything, as rclpy's own has, and needs no permission to.
+    """
 
     def __init__(self, node: Node) -> None:
         """Ask as a node."""
         self._node = node
-        self._clients: dict[str, AsyncParameterClient] = {}
+        self._clients: dict[str, tuple[Client, Client]] = {}
 
     def nodes(self) -> list[str]:
         """Full names of the nodes that can be asked."""
@@ -29,14 +34,17 @@ class ParameterReader:
         A node that gives no value for some of its parameters gives none: it has to be asked again.
         """
         if node not in self._clients:
-            self._clients[node] = AsyncParameterClient(self._node, node)
-        client = self._clients[node]
-        if not client.services_are_ready():
+            self._clients[node] = (
+                self._node.create_client(ListParameters, f"{node}/list_parameters"),
+                self._node.create_client(GetParameters, f"{node}/get_parameters"),
+            )
+        listing, getting = self._clients[node]
+        if not (listing.service_is_ready() and getting.service_is_ready()):
             return False
 
         def on_list(answer: Future) -> None:
             names = list(answer.result().result.names)
-            client.get_parameters(names, callback=lambda values: on_values(names, values))
+            getting.call_async(GetParameters.Request(names=names)).add_done_callback(partial(on_values, names))
 
         def on_values(names: list[str], answer: Future) -> None:
             values = answer.result().values
@@ -50,5 +58,5 @@ class ParameterReader:
                 }
             )
 
-        client.list_parameters(callback=on_list)
+        listing.call_async(ListParameters.Request()).add_done_callback(on_list)
         return True

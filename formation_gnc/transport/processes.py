@@ -73,7 +73,7 @@ class Graph:
         self._directory = directory
 
     def start(self, name: str, arguments: list[str], respawns: int = 0) -> NodeProcess:
-        """Start the node of this full name, such as ``/deputy1/controller``, in a session of its own.
+        """Start the node of this full name, such as ``/deputy1/controller``, in a session and enclave of its own.
 
         respawns: times that `respawn` may start it again.
         """
@@ -82,7 +82,7 @@ class Graph:
         log = self._directory / f"{name.strip('/').replace('/', '.')}.log"
         with log.open("ab") as stream:
             process = subprocess.Popen(
-                [executable(kind), "--ros-args", *remap, *arguments],
+                [executable(kind), "--ros-args", *remap, "--enclave", name, *arguments],
                 stdin=subprocess.DEVNULL,
                 stdout=stream,
                 stderr=subprocess.STDOUT,

@@ -1,0 +1,1 @@
+"""Attacks on a live graph, as data: what a stranger in the same ROS domain does."""
