@@ -3,6 +3,7 @@
 import ctypes
 import struct
 from collections.abc import Callable
+from time import time_ns
 from typing import Any
 
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -14,11 +15,14 @@ from rclpy.waitable import NumberOfEntities, Waitable
 
 from formation_gnc.flight.reception import Information
 
+BURST = 100
+"""Messages taken at once; then timers have their turn, whoever floods the topic."""
+
+RECENT = 1_000_000
+"""Time (ns) since a message was published within which none is looked for behind it, in vain at nearly every tick."""
+
 UNNUMBERED = 2**64 - 1
 """Sequence number of a middleware that has none."""
-
-_RETIRED: list["IdentifiedSubscription"] = []
-"""Those that were destroyed: the executor may still ask one for a message that it had noticed, by an address."""
 
 _TAKEN = 0
 _NONE_THERE = 401  # RCL_RET_SUBSCRIPTION_TAKE_FAILED
@@ -62,6 +66,8 @@ _take = ctypes.CDLL("librcl.so").rcl_take_serialized_message
 _take.argtypes = [ctypes.c_void_p] * 4
 _default_allocator = ctypes.CDLL("librcutils.so").rcutils_get_default_allocator
 _default_allocator.restype = _Allocator
+_notify = ctypes.CDLL("librcl.so").rcl_subscription_set_on_new_message_callback
+_notify.argtypes = [ctypes.c_void_p] * 3
 _release = ctypes.CDLL("librcutils.so").rcutils_uint8_array_fini
 _release.argtypes = [ctypes.c_void_p]
 
@@ -87,7 +93,7 @@ class IdentifiedSubscription(Waitable):  # type: ignore[misc]
         check_is_valid_msg_type(kind)
         with node.handle:
             self.handle = rclpy_implementation.Subscription(node.handle, kind, topic, profile.get_c_qos_profile())
-        self._node, self._callback, self._is_retired = node, callback, False
+        self._node, self._callback, self._is_silent = node, callback, False
         self._buffer, self._info = _Buffer(allocator=_default_allocator()), _MessageInfo()
         addresses = self.handle.pointer, ctypes.addressof(self._buffer), ctypes.addressof(self._info)
         self._arguments = *map(ctypes.c_void_p, addresses), None
@@ -110,10 +116,17 @@ class IdentifiedSubscription(Waitable):  # type: ignore[misc]
         }
 
     def is_ready(self, _wait_set: Any) -> bool:
-        """Take a message; the executor asks once for each, and after a burst lets timers have their turn."""
-        message = None if self._is_retired else self.take()
-        if message is not None:
+        """Take what is there: a message, and where that has waited, those that may wait behind it.
+
+        The executor asks once for each, but slowly: a stranger's burst would push out of the queue what is awaited.
+        """
+        for _ in range(0 if self._is_silent else BURST):
+            message = self.take()
+            if message is None:
+                break
             self._callback(*message)
+            if time_ns() - message[1]["source_timestamp"] < RECENT:
+                break
         return False
 
     def get_num_entities(self) -> NumberOfEntities:
@@ -130,10 +143,17 @@ class IdentifiedSubscription(Waitable):  # type: ignore[misc]
     async def execute(self, taken_data: Any) -> None:
         """Nothing is left for a task."""
 
+    def silence(self) -> None:
+        """Take no more messages.
+
+        To come before `destroy`, with the executor at work in between: a message that it has noticed and not asked for
+        would have it end what is destroyed without the interpreter's lock, and crash.
+        """
+        self._is_silent = True
+        _notify(self.handle.pointer, None, None)
+
     def destroy(self) -> None:
-        """Unsubscribe."""
-        self._is_retired = True
-        _RETIRED.append(self)
+        """Unsubscribe; after `silence`."""
         for each in self._waitables:
             self._node.remove_waitable(each)
         for handler in self._waitables[1:]:
@@ -153,11 +173,15 @@ class IdentifiedSubscription(Waitable):  # type: ignore[misc]
         _release(ctypes.addressof(self._buffer))
 
 
-def unsubscribe(node: Node) -> None:
-    """Destroy all identified subscriptions of a node; rclpy leaves its waitables alone."""
-    for each in list(node.waitables):
-        if isinstance(each, IdentifiedSubscription):
-            each.destroy()
+def unsubscribe(node: Node, executor: Any = None) -> None:
+    """Destroy all identified subscriptions of a node, which rclpy leaves alone; `executor`: the one that serves it."""
+    subscriptions = [each for each in node.waitables if isinstance(each, IdentifiedSubscription)]
+    for each in subscriptions:
+        each.silence()
+    if executor is not None:
+        executor.spin_once(timeout_sec=0.0)
+    for each in subscriptions:
+        each.destroy()
 
 
 def identities(node: Node, topic: str) -> dict[bytes, str]:

@@ -245,11 +245,11 @@ class ConfiguredNode(Node):  # type: ignore[misc]
         deadline = monotonic() + FAREWELL
         for publisher in self.publishers:
             publisher.wait_for_all_acked(Duration(seconds=max(0.0, deadline - monotonic())))
+        unsubscribe(self, self._served_by)
         if self._served_by is not None:
             self._served_by.remove_node(self)
             if not self._served_by.get_nodes():
                 self._served_by.shutdown()
-        unsubscribe(self)
         super().destroy_node()
 
 

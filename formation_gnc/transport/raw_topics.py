@@ -4,9 +4,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from time import monotonic
-from typing import Any
 
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSDurabilityPolicy, QoSProfile, QoSReliabilityPolicy
 
@@ -14,10 +12,10 @@ from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
 from formation_gnc.flight.reception import Information
 from formation_gnc.flight.sources import SourceLock, Verdict
-from formation_gnc.transport.identified import IdentifiedSubscription, identities
+from formation_gnc.transport.identified import identities
 from formation_gnc.transport.message_types import message_class
 from formation_gnc.transport.qos import quality
-from formation_gnc.transport.subscriptions import first_stamp
+from formation_gnc.transport.subscriptions import Subscriptions, first_stamp
 
 Callback = Callable[[bytes, Information], None]
 """Takes a message's CDR bytes and what is known of it, with its `stamp` in ns."""
@@ -46,13 +44,12 @@ class RawTopics:
         self._node, self._open, self._formation = node, open_topic, formation
         self._known: set[str] = set()
         self._unheard: set[str] = set()
-        self._receivers: dict[str, tuple[Any, Callable[..., None]]] = {}
-        self._subscriptions: dict[str, IdentifiedSubscription] = {}
+        self._subscriptions: dict[str, Subscriptions] = {}
         self._clocks: list[SourceLock] = []
         self._time = 0
 
     def look(self) -> None:
-        """Subscribe to the topics that have appeared since, and again where a writer is not matched."""
+        """Subscribe to the topics that have appeared since, and besides where a writer is not matched."""
         for lock in self._clocks:
             lock.succeeds(monotonic())
         for topic in list(self._unheard):
@@ -90,7 +87,7 @@ class RawTopics:
                 self._time = stamp
             take(data, about | {"stamp": stamp})
 
-        self._receivers[topic] = (kind, receive)
+        self._subscriptions[topic] = Subscriptions(self._node, kind, topic, receive)
         self._subscribe_to_offers(topic)
 
     def _name_of(self, topic: str, type_name: str) -> str | None:
@@ -111,10 +108,4 @@ class RawTopics:
         return qos
 
     def _subscribe_to_offers(self, topic: str) -> None:
-        if topic in self._subscriptions:
-            self._subscriptions[topic].destroy()
-        kind, receive = self._receivers[topic]
-        events = SubscriptionEventCallbacks(incompatible_qos=lambda _: self._unheard.add(topic))
-        self._subscriptions[topic] = IdentifiedSubscription(
-            self._node, kind, topic, receive, self._offered(topic), events
-        )
+        self._subscriptions[topic].add(self._offered(topic), lambda _: self._unheard.add(topic))

@@ -44,6 +44,6 @@ def show_graph(view: LiveView, ended: Callable[[], bool]) -> None:
             everything.look()
             executor.spin_until_future_complete(Future(), timeout_sec=LOOK_PERIOD)
     finally:
-        unsubscribe(node)
+        unsubscribe(node, executor)
         node.destroy_node()
         rclpy.try_shutdown(context=context)
