@@ -3,8 +3,22 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from formation_gnc.mode_records import RestrictionKind
 from formation_gnc.supervision.fault_table import FOREVER, Entry, Response
 from formation_gnc.supervision.modes import Mode
+
+RESTRICTIONS = {
+    Response.ISOLATE_SENSOR: RestrictionKind.SENSOR,
+    Response.ISOLATE_AXIS: RestrictionKind.AXIS,
+    Response.SWITCH_LAW: RestrictionKind.LAW,
+}
+"""What modules do without, by response."""
+
+BY_INNOVATIONS = frozenset({"innovation_bias", "innovation_drift"})
+"""Monitors that accuse a sensor by what the others have made the state: with fewer than half of them left, these may be
+right, or the model of the motion wrong."""
+
+TOO_FEW = "too few sensors are left to say which are wrong"
 
 
 @dataclass(frozen=True, slots=True)

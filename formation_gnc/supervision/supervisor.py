@@ -34,7 +34,7 @@ from formation_gnc.supervision.modes import COMMANDS, FAULTS, Step, Trigger, ref
 from formation_gnc.supervision.monitor import Level, Verdict
 from formation_gnc.supervision.parameters import SupervisorParameters
 from formation_gnc.supervision.registry import MONITORS
-from formation_gnc.supervision.responses import ActiveResponse, FaultResponses
+from formation_gnc.supervision.responses import BY_INNOVATIONS, RESTRICTIONS, TOO_FEW, ActiveResponse, FaultResponses
 from formation_gnc.supervision.safe import Evasion, plan_evasion
 from formation_gnc.types import AXES
 
@@ -47,21 +47,8 @@ QUIET = 60
 EVASIVE = frozenset({Mode.AVOID, Mode.SAFE})
 """Modes that begin with a plan."""
 
-RESTRICTIONS = {
-    Response.ISOLATE_SENSOR: RestrictionKind.SENSOR,
-    Response.ISOLATE_AXIS: RestrictionKind.AXIS,
-    Response.SWITCH_LAW: RestrictionKind.LAW,
-}
-"""What modules do without, by response."""
-
 UNTRUSTED = frozenset({"innovation_consistency", "estimate_jump", "frozen_estimate", "chief_ephemeris"})
 """Monitors whose failure says that the estimate is not to be steered by."""
-
-BY_INNOVATIONS = frozenset({"innovation_bias", "innovation_drift"})
-"""Monitors that accuse a sensor by what the others have made the state: with fewer than half of them left, these may be
-right, or the model of the motion wrong."""
-
-TOO_FEW = "too few sensors are left to say which are wrong"
 
 SEPARATION = "separation"
 """Monitor by which `avoid` ends."""

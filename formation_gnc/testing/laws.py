@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.typing import ArrayLike
@@ -111,7 +111,7 @@ def ticks(draw: Any) -> dict[str, Any]:
     }
 
 
-@settings(max_examples=12)
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.too_slow])  # on a busy machine
 @given(flight=st.lists(ticks(), min_size=1, max_size=4), limit=st.sampled_from([LIMIT, STRONG]))
 def test_the_thrust_is_finite_and_within_the_limit(algorithm: str, flight: list[dict[str, Any]], limit: Vector) -> None:
     """Whatever a law is given, also NaN and absurd values; an estimate that is not finite gives no thrust."""

@@ -245,7 +245,7 @@ def test_what_is_isolated_is_judged_further_and_returns_when_it_is_well() -> Non
     assert 600 < end < 900
 
 
-def test_sensors_that_contradict_the_state_one_after_the_other_lead_to_safe() -> None:
+def test_a_second_sensor_that_contradicts_the_state_leads_to_safe() -> None:
     """Of three, one is isolated; with a second one accused it may be the motion that is not as told."""
     module = supervisor()
     for number in range(0, 400):
