@@ -3,7 +3,6 @@
 import ctypes
 import struct
 from collections.abc import Callable
-from time import time_ns
 from typing import Any
 
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -17,9 +16,6 @@ from formation_gnc.flight.reception import Information
 
 BURST = 100
 """Messages taken at once; then timers have their turn, whoever floods the topic."""
-
-RECENT = 1_000_000
-"""Time (ns) since a message was published within which none is looked for behind it, in vain at nearly every tick."""
 
 UNNUMBERED = 2**64 - 1
 """Sequence number of a middleware that has none."""
@@ -116,17 +112,16 @@ class IdentifiedSubscription(Waitable):  # type: ignore[misc]
         }
 
     def is_ready(self, _wait_set: Any) -> bool:
-        """Take what is there: a message, and where that has waited, those that may wait behind it.
+        """Take what is there, though the executor asks once for each message.
 
-        The executor asks once for each, but slowly: a stranger's burst would push out of the queue what is awaited.
+        It asks slowly: a stranger's burst would push out of the queue what is awaited, and a message that nobody
+        was told of would wait for the next one, which in lock-step waits for it.
         """
         for _ in range(0 if self._is_silent else BURST):
             message = self.take()
             if message is None:
                 break
             self._callback(*message)
-            if time_ns() - message[1]["source_timestamp"] < RECENT:
-                break
         return False
 
     def get_num_entities(self) -> NumberOfEntities:
