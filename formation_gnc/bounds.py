@@ -31,7 +31,7 @@ def bounded(bound: Bound, **metadata: Any) -> dict[str, Any]:
 
 def finite_state(value: Vector | Matrix) -> str:
     """States or lists of them, of any shape."""
-    # Neither warns of an overflow nor stands in need of a context that is slow to enter; false for NaN.
+    # No warning of an overflow, as NumPy's: a context against it is slow to enter. False for NaN.
     return "" if hypot(*value.ravel().tolist()) < LARGEST else f"finite and below {LARGEST:g}"
 
 

@@ -35,7 +35,7 @@ def load_plugins(kind: str, base: type, taken: Iterable[str]) -> Iterator[tuple[
         taken: names of the built-in entries.
 
     Raises:
-        ConfigurationError: one cannot be imported, is no `base`, or has a name that is taken.
+        ConfigurationError: one cannot be imported, is no `base`, or has a name that is taken or is not the entry's.
     """
     names = set(taken)
     for entry in _declared():
@@ -51,6 +51,8 @@ def load_plugins(kind: str, base: type, taken: Iterable[str]) -> Iterator[tuple[
             raise ConfigurationError(f"{who}: cannot be imported: {type(error).__name__}: {error}") from error
         if not (issubclass(plugin, base) if isinstance(plugin, type) else isinstance(plugin, base)):
             raise ConfigurationError(f"{who}: must be a {base.__module__}.{base.__qualname__}")
+        if (name := getattr(plugin, "name", entry.name)) != entry.name:
+            raise ConfigurationError(f"{who}: its name is {name!r}; both must be the same")
         yield entry.name, plugin
 
 

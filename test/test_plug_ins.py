@@ -16,6 +16,7 @@ from formation_gnc.control.coast import Coast
 from formation_gnc.control.controller import Controller
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.recording.provenance import provenance
+from formation_gnc.supervision.monitor import Monitor
 
 ROOT = Path(__file__).parents[1]
 EXAMPLE = ROOT / "examples" / "own_law"
@@ -60,6 +61,13 @@ def test_two_packages_cannot_bring_the_same_name(monkeypatch):
     declared(monkeypatch, ("own", coast), ("own", "formation_gnc.control.lqr:LinearQuadraticRegulator"))
     with pytest.raises(ConfigurationError, match=r"plug-in own .*: the name is taken"):
         list(plugins.load_plugins("laws", Controller, {}))
+
+
+def test_a_plug_in_with_another_name_than_its_entry_is_refused(monkeypatch):
+    found = (EntryPoint("cold", "formation_gnc.supervision.monitors.mass:Mass", "formation_gnc.monitors"),)
+    monkeypatch.setattr(plugins, "_declared", lambda: found)
+    with pytest.raises(ConfigurationError, match=r"plug-in cold \(.*\): its name is 'mass'; both must be the same"):
+        list(plugins.load_plugins("monitors", Monitor, {}))
 
 
 def test_monitors_and_figures_join_their_registries(tmp_path):

@@ -56,7 +56,5 @@ def sensors() -> Mapping[str, Sensor]:
     return MappingProxyType(_SENSORS)
 
 
-for _name, _sensor in load_plugins("sensors", Sensor, _SENSORS):
-    if _sensor.name != _name:
-        raise ConfigurationError(f"plug-in {_name}: its sensor's name is {_sensor.name!r}; both must be the same")
+for _, _sensor in load_plugins("sensors", Sensor, _SENSORS):
     register(_sensor)

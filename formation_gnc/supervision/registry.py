@@ -1,6 +1,5 @@
 """All health monitors by name: a new one is one file in `monitors/` and one line here, or a plug-in."""
 
-from formation_gnc.errors import ConfigurationError
 from formation_gnc.plugins import load_plugins
 from formation_gnc.supervision.monitor import Monitor
 from formation_gnc.supervision.monitors.chief_ephemeris import ChiefEphemeris
@@ -46,10 +45,7 @@ MONITORS: dict[str, type[Monitor]] = {
     "heartbeat": Heartbeat,
     "cycle_slips": CycleSlips,
 }
-for _name, _monitor in load_plugins("monitors", Monitor, MONITORS):
-    if _monitor.name != _name:
-        raise ConfigurationError(f"plug-in {_name}: its monitor's name is {_monitor.name!r}; both must be the same")
-    MONITORS[_name] = _monitor
+MONITORS.update(load_plugins("monitors", Monitor, MONITORS))
 
 
 def table() -> str:

@@ -58,13 +58,14 @@ class _MessageInfo(ctypes.Structure):
 _INFORMATION = struct.Struct("@q8xQ16x16s")
 """Of _MessageInfo: source timestamp, publication sequence number, publisher."""
 
-_take = ctypes.CDLL("librcl.so").rcl_take_serialized_message
+_rcl, _rcutils = ctypes.CDLL("librcl.so"), ctypes.CDLL("librcutils.so")
+_take = _rcl.rcl_take_serialized_message
 _take.argtypes = [ctypes.c_void_p] * 4
-_default_allocator = ctypes.CDLL("librcutils.so").rcutils_get_default_allocator
-_default_allocator.restype = _Allocator
-_notify = ctypes.CDLL("librcl.so").rcl_subscription_set_on_new_message_callback
+_notify = _rcl.rcl_subscription_set_on_new_message_callback
 _notify.argtypes = [ctypes.c_void_p] * 3
-_release = ctypes.CDLL("librcutils.so").rcutils_uint8_array_fini
+_default_allocator = _rcutils.rcutils_get_default_allocator
+_default_allocator.restype = _Allocator
+_release = _rcutils.rcutils_uint8_array_fini
 _release.argtypes = [ctypes.c_void_p]
 
 

@@ -124,7 +124,6 @@ def main(output: Path, names: Sequence[str] = ()) -> int:
             keep(rows)
             short = [row.fault for row in rows if row.falls_short]
             print(*table, f"{len(short)} short: {', '.join(short)}", flush=True)
-            (output / "faults.md").write_text(page(kept())[0])
-    text, figures = page(kept())
-    (output / "faults.md").write_text(text)
+            text, figures = page(kept())
+            (output / "faults.md").write_text(text)
     return sum(not figure.holds for figure in figures)

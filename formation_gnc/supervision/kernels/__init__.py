@@ -42,6 +42,21 @@ kg/(N s); largest rate of it, kg/s; their number."""
 
 
 @inline
+def _hill_transition(rate: float, t: float) -> Array:
+    """(6, 6) state transition matrix of Hill's equations."""
+    c, s = cos(rate * t), sin(rate * t)
+    out = np.zeros((6, 6))
+    out[0, 0], out[0, 3], out[0, 4] = 4.0 - 3.0 * c, s / rate, 2.0 * (1.0 - c) / rate
+    out[1, 0], out[1, 1], out[1, 3] = 6.0 * (s - rate * t), 1.0, -2.0 * (1.0 - c) / rate
+    out[1, 4] = 4.0 * s / rate - 3.0 * t
+    out[2, 2], out[2, 5] = c, s / rate
+    out[3, 0], out[3, 3], out[3, 4] = 3.0 * rate * s, c, 2.0 * s
+    out[4, 0], out[4, 3], out[4, 4] = -6.0 * rate * (1.0 - c), -2.0 * s, 4.0 * c - 3.0
+    out[5, 2], out[5, 5] = -rate * s, c
+    return out
+
+
+@inline
 def _reckon_impulse(x: float, y: float, z: float, half: float, after: float, memory: Array) -> None:
     """Add what an impulse (m/s) will have caused by Hill's equations.
 
@@ -50,14 +65,11 @@ def _reckon_impulse(x: float, y: float, z: float, half: float, after: float, mem
     """
     rate = memory[TURN]
     c, s = cos(rate * half), sin(rate * half)
-    x, y = c * x + s * y, c * y - s * x
-    c, s = cos(rate * after), sin(rate * after)
-    memory[SHIFT] += (s * x + 2.0 * (1.0 - c) * y) / rate
-    memory[SHIFT + 1] += (4.0 * s * y - 2.0 * (1.0 - c) * x) / rate - 3.0 * after * y
-    memory[SHIFT + 2] += s * z / rate
-    memory[SPEED] += c * x + 2.0 * s * y
-    memory[SPEED + 1] += (4.0 * c - 3.0) * y - 2.0 * s * x
-    memory[SPEED + 2] += c * z
+    impulse, phi = (c * x + s * y, c * y - s * x, z), _hill_transition(rate, after)
+    for i in range(3):
+        for axis in range(3):
+            memory[SHIFT + i] += phi[i, 3 + axis] * impulse[axis]
+            memory[SPEED + i] += phi[3 + i, 3 + axis] * impulse[axis]
 
 
 @kernel(boolean(ANY_VECTOR, ANY_VECTOR, boolean, boolean, float64, float64, float64, float64[::1], float64[::1]))
@@ -130,9 +142,8 @@ def _advance(state: Array, duration: float, steps: int) -> None:
             share = 0.0 if i == 0 else (1.0 if i == 3 else 0.5)
             for c in range(6):
                 stage[c] = state[c] + (share * h * rates[i - 1, c] if i > 0 else 0.0)
-            gx, gy, gz = oblate_acceleration(stage[0], stage[1], stage[2])
             rates[i, 0], rates[i, 1], rates[i, 2] = stage[3], stage[4], stage[5]
-            rates[i, 3], rates[i, 4], rates[i, 5] = gx, gy, gz
+            rates[i, 3], rates[i, 4], rates[i, 5] = oblate_acceleration(stage[0], stage[1], stage[2])
         for c in range(6):
             state[c] += h / 6.0 * (rates[0, c] + 2.0 * rates[1, c] + 2.0 * rates[2, c] + rates[3, c])
 
@@ -142,21 +153,6 @@ def _unmodelled(state: Array) -> tuple[float, float]:
     """Radius (m) of an inertial state, and the largest acceleration beyond point mass and J2 there, m/s^2."""
     radius = sqrt(state[0] * state[0] + state[1] * state[1] + state[2] * state[2])
     return radius, GRAVITY * (EARTH_RADIUS / radius) ** 4 + OTHER
-
-
-@inline
-def _hill_transition(rate: float, t: float) -> Array:
-    """(6, 6) state transition matrix of Hill's equations."""
-    c, s = cos(rate * t), sin(rate * t)
-    out = np.zeros((6, 6))
-    out[0, 0], out[0, 3], out[0, 4] = 4.0 - 3.0 * c, s / rate, 2.0 * (1.0 - c) / rate
-    out[1, 0], out[1, 1], out[1, 3] = 6.0 * (s - rate * t), 1.0, -2.0 * (1.0 - c) / rate
-    out[1, 4] = 4.0 * s / rate - 3.0 * t
-    out[2, 2], out[2, 5] = c, s / rate
-    out[3, 0], out[3, 3], out[3, 4] = 3.0 * rate * s, c, 2.0 * s
-    out[4, 0], out[4, 3], out[4, 4] = -6.0 * rate * (1.0 - c), -2.0 * s, 4.0 * c - 3.0
-    out[5, 2], out[5, 5] = -rate * s, c
-    return out
 
 
 @inline

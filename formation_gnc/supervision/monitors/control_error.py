@@ -2,8 +2,7 @@
 
 from math import dist, hypot, inf, isfinite, tau
 
-from numpy import cross
-
+from formation_gnc.orbit.frames import hill_rate
 from formation_gnc.records import EstimateStatus, Target
 from formation_gnc.supervision.modes import Mode
 from formation_gnc.supervision.monitor import Monitor, Observation, When
@@ -92,7 +91,7 @@ class ControlError(Monitor):
             return True
         seconds = (target.time - last.time) / NANOSECONDS
         position, before = target.relative_state[:3].tolist(), last.relative_state.tolist()
-        angle = hypot(*cross(chief[:3], chief[3:]).tolist()) / float(chief[:3] @ chief[:3]) * seconds
+        angle = hill_rate(chief) * seconds
         curved = CURVATURE * angle**2 * max(hypot(*position), hypot(*before[:3]))
         off = dist(position, [before[axis] + seconds * before[3 + axis] for axis in range(3)])
         return off > LEAP * self.parameters.tube + curved

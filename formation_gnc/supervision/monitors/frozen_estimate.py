@@ -28,7 +28,7 @@ class FrozenEstimate(Monitor):
         """Compare the estimate of a tick with the last one; without one it begins anew."""
         estimate, last = observation.estimate, self._last
         self._last = estimate
-        if not observation.slow or estimate is None or last is None:
+        if estimate is None or last is None:
             self._run = 0
             return
         is_same = estimate.time > last.time and estimate.relative_state.tolist() == last.relative_state.tolist()

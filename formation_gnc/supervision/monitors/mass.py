@@ -27,7 +27,8 @@ class Mass(Monitor):
 
     def prepare(self) -> None:
         """The mass at the start of a flight."""
-        self._start, self._last, self._is_known = self.parameters.mass, 0, False
+        self._initial = self._start = self.parameters.mass
+        self._last, self._is_known = 0, False
 
     def feed(self, observation: Observation) -> None:
         """Judge, but where it has just been anchored."""
@@ -38,10 +39,11 @@ class Mass(Monitor):
             self._anchor(measurement.mass, (observation.time - self._last) / NANOSECONDS, thrust)
         self._last = observation.time
         if not self._is_known and abs(measurement.mass - self._start) <= INITIAL * self._start:
-            self._start, self._is_known = measurement.mass + thrust.burned, True
+            self._initial = self._start = measurement.mass + thrust.burned
+            self._is_known = True
         if not observation.missed:
             expected = self._start - thrust.burned
-            allowed = GAUGE * self.parameters.mass + USED * max(0.0, self.parameters.mass - expected)
+            allowed = GAUGE * self._initial + USED * max(0.0, self._initial - expected)
             self.judge("", abs(measurement.mass - expected) / allowed, 0.5, 1.0)
 
     def _anchor(self, mass: float, seconds: float, thrust: ThrustTally) -> None:
