@@ -15,7 +15,7 @@ from formation_gnc.control.mpc import MAX_ERROR, ModelPredictiveController, MpcP
 from formation_gnc.control.mpc_constraints import PlanInputs, ThrustRate
 from formation_gnc.errors import DesignError
 from formation_gnc.records import NO_NEIGHBOURS, NavigationState, Target
-from formation_gnc.types import NANOSECONDS
+from formation_gnc.types import NANOSECONDS, Matrix
 
 SOURCES = Path(__file__).with_name("c")
 """What is the same for every design."""
@@ -23,19 +23,26 @@ SOURCES = Path(__file__).with_name("c")
 PREFIX = "mpc_"
 """Of OSQP's data."""
 
+FAITHFULNESS = 1e-9
+"""Largest difference of a command within bounds from the law's, over the limit, that its rounding may make."""
+
+MAX_CONDITION = FAITHFULNESS / np.finfo(float).eps
+"""Condition of the QP's Hessian beyond which the order of sums alone makes more."""
+
 
 def export_mpc(parameters: MpcParameters, common: CommonParameters, vehicle: Vehicle, directory: Path) -> None:
     """Write the MPC as C to a new folder, to be built by its Makefile.
 
-    The commands are those of the law, to rounding, from the same estimates and targets, of which the preview counts if
-    it is on the plan's steps. Where the law would fall back on LQR, the code says that it has no plan.
+    The commands are those of the law from the same estimates and targets, of which the preview counts if it is on the
+    plan's steps, to rounding: gradients are summed in another order. Where the law would fall back on LQR, the code
+    says that it has no plan.
 
     Raises:
         DesignError: as the law's, or the design has something that the C code has not.
         OSError: the folder cannot be written.
     """
     law = ModelPredictiveController(parameters, common, vehicle)
-    _check(parameters, len(law.qps))
+    _check(parameters, law)
     shutil.copytree(SOURCES, directory, dirs_exist_ok=False)
     osqp = directory / "osqp"
     law.solver.workspace.codegen(str(osqp), parameters="matrices", extension_name=None, prefix=PREFIX)
@@ -46,10 +53,10 @@ def export_mpc(parameters: MpcParameters, common: CommonParameters, vehicle: Veh
     (directory / "mpc_data.c").write_text(_data(arrays), encoding="utf-8")
 
 
-def _check(parameters: MpcParameters, count: int) -> None:
-    """Raise DesignError for what the C code has not."""
+def _check(parameters: MpcParameters, law: ModelPredictiveController) -> None:
+    """Raise DesignError for what the C code has not, or cannot command as the law does."""
     lacking = {
-        f"model {parameters.model}, which varies along the orbit": count > 1,
+        f"model {parameters.model}, which varies along the orbit": len(law.qps) > 1,
         f"cost {parameters.cost}": parameters.cost != "quadratic",
         f"keep_out_radius {parameters.keep_out_radius:g}": parameters.keep_out_radius > 0.0,
         "off_in_eclipse with thrust_rate": parameters.off_in_eclipse and parameters.thrust_rate > 0.0,
@@ -60,6 +67,20 @@ def _check(parameters: MpcParameters, count: int) -> None:
                 f"mpc: {what} cannot be exported to C; it must be a time-invariant model with quadratic cost, no "
                 "keep-out, and eclipses or a limit on the rate, not both"
             )
+    condition = float(np.linalg.cond(_hessian(law)))
+    if not condition <= MAX_CONDITION:
+        raise DesignError(
+            f"mpc: a QP of condition {condition:.1e} cannot be exported to C; it must be at most {MAX_CONDITION:.1e}, "
+            f"so that rounding is less than {FAITHFULNESS:g} of the limit: weigh thrust more beside the errors"
+        )
+
+
+def _hessian(law: ModelPredictiveController) -> Matrix:
+    """(3 M, 3 M), whole."""
+    count = law.solver.count
+    half: Matrix = np.zeros((count, count))
+    half[np.tril_indices(count)] = law.qps[0].hessian
+    return half + np.tril(half, -1).T
 
 
 def _constants(
@@ -101,16 +122,13 @@ def _constants(
 
 def _arrays(law: ModelPredictiveController, vehicle: Vehicle) -> dict[str, np.ndarray[Any, Any]]:
     """Matrices and vectors of the design, by the names that the C code has for them."""
-    qp, count = law.qps[0], law.solver.count
-    hessian = np.zeros((count, count))
-    hessian[np.tril_indices(count)] = qp.hessian
-    hessian += np.tril(hessian, -1).T
+    qp = law.qps[0]
     quiet = NavigationState(0, np.zeros(6), np.zeros(6), vehicle.mass)
     target = Target(0, "", np.zeros(6), NANOSECONDS, NO_NEIGHBOURS)
     bounds = [each.bounds(PlanInputs(qp, quiet, target, np.empty((0, 3)))) for each in law.constraints]
     rows = sparse.csr_array(law.solver.matrices[1])
     return {
-        "hessian": hessian,
+        "hessian": _hessian(law),
         "gradient": qp.gradient,
         "gradient_of_state": qp.gradient_of_state,
         "cost_of_state": qp.cost_of_state,
