@@ -251,13 +251,15 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
             self._report_observability(state)
 
     def _acceleration(self, state: FilterState, measurement: Measurement) -> Vector:
-        """Acceleration by thrust over the tick that has ended; zero where it is not plausible."""
-        if is_plausible_mass(measurement.mass, state.mass if state.is_mass_known else None):
+        """Acceleration by thrust over the tick that has ended, from its mass; zero where it is not plausible."""
+        before = state.mass if state.is_mass_known else None
+        if is_plausible_mass(measurement.mass, before):
             state.mass, state.is_mass_known = measurement.mass, True
         else:
             self._rejections.add(Rejection.AVIONICS, "mass")
+        mass = before or state.mass
         x, y, z = measurement.applied_force.tolist()
-        acceleration = x / state.mass, y / state.mass, z / state.mass  # numbers: half the time of an array
+        acceleration = x / mass, y / mass, z / mass  # numbers: half the time of an array
         if is_plausible_acceleration(*acceleration):
             return np.array(acceleration)
         self._rejections.add(Rejection.AVIONICS, "applied force")

@@ -328,6 +328,28 @@ def test_an_unknown_manoeuvre_inflates_the_covariance() -> None:
     assert all(np.isfinite(each.relative_state).all() for each in estimates)
 
 
+def test_thrust_acts_on_the_mass_that_its_tick_began_with() -> None:
+    setup = parameters(tick=10.0)
+    samples = list(simulate(setup, 3, np.random.default_rng(31)))
+
+    def velocity(masses: tuple[float, float, float], force: float = 0.1) -> float:
+        """Cross-track, after two ticks of the force, without readings."""
+        measurements = [
+            replace(sample.measurement, readings=[], applied_force=np.array([0.0, 0.0, force * (index > 0)]), mass=mass)
+            for index, (sample, mass) in enumerate(zip(samples, masses, strict=True))
+        ]
+        filter = navigation_filter(setup)
+        estimates = [filter.on_tick(each) for each in measurements]
+        assert estimates[-1] is not None
+        return float(estimates[-1].relative_state[5])
+
+    coasting, full = velocity((100.0, 100.0, 100.0), 0.0), velocity((100.0, 100.0, 100.0))
+    assert velocity((100.0, 100.0, 95.0)) == full
+    assert velocity((100.0, 95.0, 95.0)) - coasting == pytest.approx(
+        (1.0 + 1.0 / 0.95) / 2.0 * (full - coasting), rel=1e-3
+    )
+
+
 def test_a_wrong_fix_is_recovered_from_by_inflation() -> None:
     """A fix 1 km off radially at a sigma of 0.5 m: the gates reject everything until the covariance covers it."""
     setup = parameters(tick=10.0)
