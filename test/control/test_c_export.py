@@ -92,6 +92,7 @@ def test_with_gradients_summed_as_in_c_the_law_is_the_c_code(tmp_path: Path, mon
     np.testing.assert_allclose(found[:, :3], recorded_demand, rtol=0, atol=3e-8 * limit.max())
 
 
+@pytest.mark.covers("Kremmydas Listing: embedded C", "control/c_export.py")
 @needs_compiler
 @pytest.mark.parametrize(
     ("controller", "limited"),

@@ -146,7 +146,7 @@ def types(directory: Path, ours: Ours) -> tuple[str, list[Figure]]:
         "within 280, 800 and 90 m of the chief from then on. The formation is the ellipse about the chief",
         "through the place.",
         "",
-        "| type | delta-v, mm/s | distance from the place an orbit later, m | largest radial, along-track,",
+        "| type | delta-v, mm/s | distance from the place an orbit later, m | largest radial, along-track, "
         "cross-track, m |",
         "|---|---|---|---|",
     ]
@@ -358,7 +358,7 @@ def freedoms(directory: Path, ours: Ours) -> tuple[str, list[Figure]]:
         "Tetrahedron to three in the plane and one out, 500 m, four satellites in ten orbits: least delta-v of",
         "all, m/s.",
         "",
-        "| phase fixed | one phase for all | a phase for the plane, one for the other | and the origin shifted",
+        "| phase fixed | one phase for all | a phase for the plane, one for the other | and the origin shifted "
         "along the track |",
         "|---|---|---|---|",
         "| "

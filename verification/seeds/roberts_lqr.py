@@ -86,7 +86,7 @@ def design_study(directory: Path, ours: Ours) -> tuple[str, list[Figure]]:
         "errors of 10 m",
         "and 0.05 m/s, and 6.5 mN, weigh the same: the fastest of those tried within 10 mN.",
         "",
-        "| model | poles, 1/1000 s | largest thrust, mN | overshoot: x, y, z, % | to 1 mm: x, y, z, s | delta-v,",
+        "| model | poles, 1/1000 s | largest thrust, mN | overshoot: x, y, z, % | to 1 mm: x, y, z, s | delta-v, "
         "mm/s |",
         "|---|---|---|---|---|---|",
     ]
