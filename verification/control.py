@@ -30,7 +30,6 @@ from formation_gnc.types import NANOSECONDS
 from verification.acquisitions import kremmydas, least_delta_v
 from verification.coverage.marker import covers
 from verification.figure import TABLE, Figure, failures, save
-from verification.laws import all_laws
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
@@ -411,7 +410,7 @@ def main(directory: Path) -> int:
     """Write the section and its plots; return how many figures are outside their tolerance."""
     directory.mkdir(parents=True, exist_ok=True)
     sections, figures = [], []
-    for part in (neokleous, roberts, kremmydas, all_laws):
+    for part in (neokleous, roberts, kremmydas):
         text, limits = part(directory)
         sections.append(text)
         figures += limits
