@@ -8,6 +8,7 @@ from formation_gnc.navigation.adaptive_noise import AdaptiveNoise
 from formation_gnc.navigation.chief_tracker import ChiefTracker
 from formation_gnc.navigation.consistency import Consistency
 from formation_gnc.navigation.filters import FILTERS, RelativeFilter
+from formation_gnc.navigation.kernels.motion import change_chief
 from formation_gnc.navigation.measurement_checks import ReadingChecks, Rejections, is_plausible_mass
 from formation_gnc.navigation.observability import Observability, orbit_period
 from formation_gnc.navigation.parameters import NavigationParameters
@@ -56,6 +57,21 @@ class FilterState:
     """Stamp at which a reading was last used, ns."""
     consistency: Consistency = field(default_factory=Consistency)
     noise: AdaptiveNoise = field(default_factory=AdaptiveNoise)
+
+    def isolate_chief(self) -> float:
+        """Go on without the chief's ephemeris, from an earlier one; returns its age, s."""
+        age, relative = self.chief.isolate(self.filter.state)
+        self.filter = type(self.filter)(relative, self.filter.covariance)
+        return age
+
+    def resume_chief(self, step: StepConstants) -> bool:
+        """Return to an ephemeris that jumped, with the deputy where it is; returns whether it has moved on an orbit."""
+        before = self.chief.state
+        if not self.chief.resume(step):
+            return False
+        relative = change_chief(before, self.filter.state, self.chief.state)
+        self.filter = type(self.filter)(relative, self.filter.covariance)
+        return True
 
 
 def acquire(
