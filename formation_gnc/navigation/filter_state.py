@@ -58,19 +58,19 @@ class FilterState:
     consistency: Consistency = field(default_factory=Consistency)
     noise: AdaptiveNoise = field(default_factory=AdaptiveNoise)
 
-    def isolate_chief(self) -> float:
-        """Go on without the chief's ephemeris, from an earlier one; returns its age, s."""
+    def isolate_chief(self, kind: str) -> float:
+        """Go on without the chief's ephemeris, from an earlier one, with a filter of a kind; returns its age, s."""
         age, relative = self.chief.isolate(self.filter.state)
-        self.filter = type(self.filter)(relative, self.filter.covariance)
+        self.filter = FILTERS[kind](relative, self.filter.covariance)
         return age
 
-    def resume_chief(self, step: StepConstants) -> bool:
+    def resume_chief(self, step: StepConstants, kind: str) -> bool:
         """Return to an ephemeris that jumped, with the deputy where it is; returns whether it has moved on an orbit."""
         before = self.chief.state
         if not self.chief.resume(step):
             return False
         relative = change_chief(before, self.filter.state, self.chief.state)
-        self.filter = type(self.filter)(relative, self.filter.covariance)
+        self.filter = FILTERS[kind](relative, self.filter.covariance)
         return True
 
 

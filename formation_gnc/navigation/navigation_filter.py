@@ -64,7 +64,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         self._mode = ModeInForce()
         self._isolated: tuple[str, ...] = ()
         """Sensors that are left out by restriction."""
-        self._restricted = self._isolated  # with chief and state
+        self._restricted: tuple[str, ...] = ()  # with chief and state
 
     def design(self, parameters: NavigationParameters) -> Design:
         """Process model, constants of a tick, variances."""
@@ -270,7 +270,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
 
     def _resume_chief(self, state: FilterState) -> None:
         """Reject an ephemeris that jumped, until it has moved on along an orbit."""
-        if state.resume_chief(self.configuration.design.step):
+        if state.resume_chief(self.configuration.design.step, self.parameters.filter):
             self.log(state.time, EventKind.CHIEF, "ephemeris goes on from elsewhere: taken up again")
         else:
             self._rejections.add(Rejection.CHIEF, "chief ephemeris")
@@ -279,7 +279,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         if state.chief.is_isolated:
             state.chief.is_isolated = False
             return self._resume_chief(state)
-        age = state.isolate_chief()
+        age = state.isolate_chief(self.parameters.filter)
         self.log(state.time, EventKind.CHIEF, f"ephemeris is isolated: propagated from that of {age:.0f} s before")
 
     def _estimate(self, state: FilterState, measurement: Measurement, status: EstimateStatus) -> Estimate | None:
