@@ -1,6 +1,7 @@
 """Tracking of the chief: its ephemeris while it is plausible, else the propagated orbit."""
 
 from collections import deque
+from typing import Self
 
 import numpy as np
 
@@ -36,6 +37,13 @@ class ChiefTracker:
         """Earlier states with their times, s, the last one that is old enough first."""
         self._jumps = deque[tuple[float, Vector, Vector]](maxlen=JUMPS)
         """Times at which an ephemeris that had jumped was taken up, s, with the states before and after."""
+
+    @classmethod
+    def propagated(cls, state: Vector, seconds: float) -> Self:
+        """One without an ephemeris that is trusted, from an earlier state (6,)."""
+        tracker = cls(motion.coast(state, _NO_ACCELERATION, seconds, substeps(seconds)) if seconds > 0.0 else state)
+        tracker.is_isolated = True
+        return tracker
 
     def advance(self, ephemeris: Vector | None, step: StepConstants) -> Vector:
         """Take the ephemeris (6,) at the end of a step, or propagate where there is none or it jumped."""

@@ -16,7 +16,7 @@ from formation_gnc.navigation.process import ProcessModel
 from formation_gnc.navigation.state_history import StateHistory
 from formation_gnc.navigation.step import StepConstants
 from formation_gnc.records import Measurement
-from formation_gnc.types import Vector
+from formation_gnc.types import NANOSECONDS, Vector
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +58,11 @@ class FilterState:
     consistency: Consistency = field(default_factory=Consistency)
     noise: AdaptiveNoise = field(default_factory=AdaptiveNoise)
 
+    def take_reports(self, design: Design, time: int) -> list[tuple[str, str]]:
+        """Sensors that are noisier than their parameters, or silent, at a time (ns), with what to say of each."""
+        silences = self.checks.take_silences(design.variance, self.start, time, design.silent_after)
+        return self.noise.take_reports() + silences
+
     def isolate_chief(self, kind: str) -> float:
         """Go on without the chief's ephemeris, from an earlier one, with a filter of a kind; returns its age, s."""
         age, relative = self.chief.isolate(self.filter.state)
@@ -75,20 +80,30 @@ class FilterState:
 
 
 def acquire(
-    measurement: Measurement, parameters: NavigationParameters, design: Design, rejections: Rejections
+    measurement: Measurement,
+    parameters: NavigationParameters,
+    design: Design,
+    rejections: Rejections,
+    own_chief: tuple[int, Vector] | None = None,
 ) -> FilterState:
-    """State of the filter from a measurement with a plausible acquisition fix."""
+    """State of the filter from a measurement with a plausible acquisition fix.
+
+    own_chief: time (ns) and state (6,) of the chief that is propagated, as its ephemeris is isolated.
+    """
+    chief = ChiefTracker(measurement.chief_state)
+    if own_chief is not None:
+        chief = ChiefTracker.propagated(own_chief[1], (measurement.time - own_chief[0]) / NANOSECONDS)
     is_mass_known = is_plausible_mass(measurement.mass)
     variance = [parameters.fix_position_sigma**2, parameters.fix_velocity_sigma**2]
     return FilterState(
         filter=FILTERS[parameters.filter](np.array(measurement.fix), np.diag(np.repeat(variance, 3))),
         time=measurement.time,
-        chief=ChiefTracker(measurement.chief_state),
+        chief=chief,
         mass=measurement.mass if is_mass_known else 1.0,
         is_mass_known=is_mass_known,
         history=StateHistory(parameters.latest_ticks),
         checks=ReadingChecks(rejections),
-        observability=expected_observability(measurement.chief_state, measurement.fix, parameters, design),
+        observability=expected_observability(chief.state, measurement.fix, parameters, design),
         start=measurement.time,
         last_reading=measurement.time,
     )

@@ -55,6 +55,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         """Without a state until a fix comes; `name` is the node's, its namespace the deputy's."""
         self._deputy = name.split("/")[-2] if name.count("/") > 1 else ""
         self._state: FilterState | None = None
+        self._lost_chief: tuple[int, Vector] | None = None
         self._said_that_it_waits = False
         self._rejections = Rejections()
         super().__init__(name, parameters)
@@ -155,15 +156,9 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
             estimate = None
         for subject, detail in self._rejections.take_reports():
             self.log(measurement.time, EventKind.REJECTED, detail, subject)
-        self._warn_of_sensors(state, measurement.time)
+        for subject, detail in state.take_reports(self._design, measurement.time):
+            self.log(measurement.time, EventKind.WARNING, detail, subject)
         return estimate
-
-    def _warn_of_sensors(self, state: FilterState, time: int) -> None:
-        """Log sensors that are noisier than their parameters, or silent."""
-        design = self._design
-        silences = state.checks.take_silences(design.variance, state.start, time, design.silent_after)
-        for subject, detail in state.noise.take_reports() + silences:
-            self.log(time, EventKind.WARNING, detail, subject)
 
     def _action(self, measurement: Measurement) -> _Action:
         """Decide by deputy, fix and stamp."""
@@ -209,8 +204,8 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
 
     def _acquire(self, measurement: Measurement) -> FilterState:
         self._said_that_it_waits = False
-        self._state = acquire(measurement, self.parameters, self._design, self._rejections)
-        self._state.chief.is_isolated = CHIEF in self._restricted
+        own = self._own_chief() if CHIEF in self._restricted else None
+        self._state = acquire(measurement, self.parameters, self._design, self._rejections, own)
         self.log(measurement.time, EventKind.ACQUIRED, "filter started from an acquisition fix")
         self._report_observability(self._state)
         return self._state
@@ -344,7 +339,12 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         pseudo = parameters.pseudo_measurements
         return update(state, readings, design.gate, pseudo, self._rejections, self._isolated)
 
+    def _own_chief(self) -> tuple[int, Vector] | None:
+        """The chief (6,) that is propagated, with its time, ns; that of the state before, where that is lost."""
+        return self._lost_chief if self._state is None else (self._state.time, self._state.chief.state)
+
     def _lose(self, time: int, reason: str) -> None:
         """Lose the state: without an estimate the tick is missed, and the next measurement has a fix."""
+        self._lost_chief = self._own_chief()
         self._state, self._said_that_it_waits = None, True
         self.log(time, EventKind.LOST, f"{reason}: waiting for an acquisition fix")

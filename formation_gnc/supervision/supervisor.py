@@ -122,7 +122,7 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         if new.design != old.design or "enabled" in new.changes:
             self._responses = FaultResponses(new.design)
             self._report(self.time, [])
-            self._active, self._restricted = [], Restricted()
+            self._active, self._restricted, self._renewal = [], Restricted(), Renewal()
         if new.changes.keys() - {"mode", "fault_table", "schedule"}:
             self._health = Health(new.parameters)
 
@@ -178,10 +178,10 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
                 self.log(time, EventKind.DETECTION, str(each), each.subject)
             self._failed[key] = time
         active = self._responses.evaluate([(each.monitor, each.subject) for each in failures], ticks, self._mode)
-        is_isolated = any(each.subject == CHIEF and each.response is Response.ISOLATE_SENSOR for each in active)
-        if is_isolated != (CHIEF in self._restricted.sensors):
-            active = self._withdraw(active)  # accused about another chief
         if active != self._active:
+            is_isolated = any(each.subject == CHIEF and each.response is Response.ISOLATE_SENSOR for each in active)
+            if is_isolated != (CHIEF in self._restricted.sensors):
+                active = self._withdraw(active)  # accused about another chief
             self._take(time, active)
 
     def _take(self, time: int, active: list[ActiveResponse]) -> None:
@@ -261,6 +261,7 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         self._evasion = None
         if before is Mode.SAFE:
             self._renewal = Renewal()
+            self._take(time, self._active)
         if self._mode in EVASIVE:
             self._evasion = self._way_out(time, estimate, target)
             detail += f"; {self._evasion.words}"

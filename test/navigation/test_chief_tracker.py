@@ -114,3 +114,19 @@ def test_a_state_that_is_not_trusted_is_given_up_once() -> None:
     assert [number for number, each in enumerate(answers) if each is None] == [*range(30, 40)]
     assert answers[40] is not None
     assert answers[40].status == EstimateStatus.ACQUIRED
+
+
+def test_a_state_begun_anew_is_about_the_chief_that_is_propagated() -> None:
+    """Its ephemeris, which is isolated, is 5 km off when the fix comes."""
+    given = samples(80)
+    filter = navigation_filter(parameters(tick=TICK))
+    for number, sample in enumerate(given):
+        measurement = sample.measurement
+        if number >= 30:
+            measurement = replace(measurement, chief_state=moved(measurement.chief_state, 5000.0))
+        if number == 52:
+            measurement = replace(measurement, fix_available=True, fix=given[0].measurement.fix)
+        subjects = [CHIEF] * (number >= 40) + [STATE] * (50 <= number < 54)
+        estimate = filter.on_tick(measurement, restricted(*subjects))
+    assert estimate is not None
+    assert np.linalg.norm(estimate.chief_state[:3] - given[-1].measurement.chief_state[:3]) < 1.0
