@@ -36,6 +36,10 @@ class RestrictionKind(StrEnum):
     LAW = "law"
 
 
+CHIEF, STATE = "chief", "state"
+"""What navigation may have to do without besides sensors, as restrictions of that kind: the chief's ephemeris, which it
+propagates itself then, and its own state, which it acquires anew."""
+
 NO_FORCE: Vector = np.zeros(3)
 NO_FORCE.setflags(write=False)
 

@@ -25,7 +25,6 @@ from formation_gnc.recording.parameters import RecorderParameters
 from formation_gnc.recording.player import ReplayParameters
 from formation_gnc.supervision import modes
 from formation_gnc.supervision import registry as monitors
-from formation_gnc.supervision.supervisor import default_fault_table
 from formation_gnc.transport.markers import DisplayParameters
 from tools.architecture import FOUNDATION, PACKAGE, ROOT, WINGS, imports, place, wing
 from tools.command_reference import commands_page
@@ -272,7 +271,7 @@ PAGES: dict[Path, Callable[[], str]] = {
             "transitions": modes.table(),
             "refusals": modes.refusals_table(),
             "monitors": monitors.table(),
-            "faults": default_fault_table(),
+            "faults": monitors.default_fault_table(),
         },
     ),
 }

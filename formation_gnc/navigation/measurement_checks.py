@@ -9,7 +9,7 @@ import numpy as np
 from formation_gnc.navigation.measurement import Readings, measurement_model
 from formation_gnc.navigation.state_history import StateHistory
 from formation_gnc.orbit.constants import EARTH_RADIUS
-from formation_gnc.records import Reading, Rejection, RejectionCount
+from formation_gnc.records import Measurement, Reading, Rejection, RejectionCount
 from formation_gnc.sensors.registry import sensors
 from formation_gnc.types import NANOSECONDS, Vector
 
@@ -156,6 +156,15 @@ class ReadingChecks:
             known.difference_update([each for each in known if each < oldest])
         known.add(taken)
         return None
+
+
+def has_plausible_fix(measurement: Measurement) -> bool:
+    """Whether a measurement brings an acquisition fix that can be in an orbit, about a chief that is."""
+    return (
+        measurement.fix_available
+        and is_plausible_chief(measurement.chief_state)
+        and is_plausible_fix(measurement.fix, measurement.chief_state)
+    )
 
 
 def is_plausible_fix(fix: Vector, chief: Vector) -> bool:

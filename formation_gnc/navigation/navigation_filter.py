@@ -8,18 +8,16 @@ import numpy as np
 
 from formation_gnc.flight.mode import ModeInForce
 from formation_gnc.flight.module import Configuration, FlightModule
-from formation_gnc.mode_records import ModeState, RestrictionKind
+from formation_gnc.mode_records import CHIEF, STATE, ModeState, RestrictionKind
 from formation_gnc.navigation.adaptive_noise import AdaptiveNoise
 from formation_gnc.navigation.consistency import UPDATES_TO_DIVERGE, Verdict
 from formation_gnc.navigation.filter_state import Design, FilterState, acquire, expected_observability
 from formation_gnc.navigation.filters import FILTERS, load
 from formation_gnc.navigation.kernels.linear_algebra import are_finite
-from formation_gnc.navigation.kernels.motion import change_chief
 from formation_gnc.navigation.measurement_checks import (
     Rejections,
+    has_plausible_fix,
     is_plausible_acceleration,
-    is_plausible_chief,
-    is_plausible_fix,
     is_plausible_mass,
 )
 from formation_gnc.navigation.parameters import NavigationParameters
@@ -57,6 +55,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         """Without a state until a fix comes; `name` is the node's, its namespace the deputy's."""
         self._deputy = name.split("/")[-2] if name.count("/") > 1 else ""
         self._state: FilterState | None = None
+        self._lost_chief: tuple[int, Vector] | None = None
         self._said_that_it_waits = False
         self._rejections = Rejections()
         super().__init__(name, parameters)
@@ -66,6 +65,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         self._mode = ModeInForce()
         self._isolated: tuple[str, ...] = ()
         """Sensors that are left out by restriction."""
+        self._restricted: tuple[str, ...] = ()  # with chief and state
 
     def design(self, parameters: NavigationParameters) -> Design:
         """Process model, constants of a tick, variances."""
@@ -111,11 +111,16 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         """Variances of the sensors in use besides the isolated ones."""
         return {name: each for name, each in self.configuration.design.variance.items() if name not in isolated}
 
-    def _obey(self) -> None:
-        """Leave out the sensors that the mode says, or take them up again; none where no other would be left."""
-        isolated = self._mode.without(RestrictionKind.SENSOR)
-        if not self._left(isolated):
-            isolated = ()
+    def _obey(self, time: int) -> None:
+        """Leave out what the mode says at a time (ns), or take it up again; no sensor where no other would be left."""
+        before, restricted = self._restricted, self._mode.without(RestrictionKind.SENSOR)
+        self._restricted = restricted
+        if self._state is not None and STATE in restricted and STATE not in before:
+            self._lose(time, "the supervisor does not trust the state")
+        if self._state is not None and (CHIEF in restricted) != (CHIEF in before):
+            self._isolate_chief(self._state)
+        isolated = tuple(each for each in restricted if each not in (CHIEF, STATE))
+        isolated = isolated if self._left(isolated) else ()
         if isolated == self._isolated:
             return
         self._isolated = isolated
@@ -129,7 +134,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         mode: of the tick before; None for the one that stands.
         """
         if self._mode.take(mode):
-            self._obey()
+            self._obey(measurement.time)
         action = self._action(measurement)
         if action is _Action.IGNORE:
             return None
@@ -151,15 +156,9 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
             estimate = None
         for subject, detail in self._rejections.take_reports():
             self.log(measurement.time, EventKind.REJECTED, detail, subject)
-        self._warn_of_sensors(state, measurement.time)
+        for subject, detail in state.take_reports(self._design, measurement.time):
+            self.log(measurement.time, EventKind.WARNING, detail, subject)
         return estimate
-
-    def _warn_of_sensors(self, state: FilterState, time: int) -> None:
-        """Log sensors that are noisier than their parameters, or silent."""
-        design = self._design
-        silences = state.checks.take_silences(design.variance, state.start, time, design.silent_after)
-        for subject, detail in state.noise.take_reports() + silences:
-            self.log(time, EventKind.WARNING, detail, subject)
 
     def _action(self, measurement: Measurement) -> _Action:
         """Decide by deputy, fix and stamp."""
@@ -167,7 +166,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         if measurement.deputy not in ("", self._deputy):
             reject(Rejection.WRONG_DEPUTY, "measurement", f"of {measurement.deputy}")
             return _Action.IGNORE
-        has_fix = _has_plausible_fix(measurement)
+        has_fix = has_plausible_fix(measurement)
         if measurement.fix_available and not has_fix:
             reject(Rejection.FIX, "acquisition fix")
         if self._state is None:
@@ -190,7 +189,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
     def first_of(self, waiting: Sequence[Measurement]) -> Measurement:
         """The last with an acquisition fix, without a state; the last otherwise."""
         if self._state is None:
-            return next((each for each in reversed(waiting) if _has_plausible_fix(each)), waiting[-1])
+            return next((each for each in reversed(waiting) if has_plausible_fix(each)), waiting[-1])
         return waiting[-1]
 
     @property
@@ -205,7 +204,8 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
 
     def _acquire(self, measurement: Measurement) -> FilterState:
         self._said_that_it_waits = False
-        self._state = acquire(measurement, self.parameters, self._design, self._rejections)
+        own = self._own_chief() if CHIEF in self._restricted else None
+        self._state = acquire(measurement, self.parameters, self._design, self._rejections, own)
         self.log(measurement.time, EventKind.ACQUIRED, "filter started from an acquisition fix")
         self._report_observability(self._state)
         return self._state
@@ -267,13 +267,17 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
 
     def _resume_chief(self, state: FilterState) -> None:
         """Reject an ephemeris that jumped, until it has moved on along an orbit."""
-        propagated = state.chief.state
-        if state.chief.resume(self.configuration.design.step):
-            relative = change_chief(propagated, state.filter.state, state.chief.state)
-            state.filter = FILTERS[self.parameters.filter](relative, state.filter.covariance)
+        if state.resume_chief(self.configuration.design.step, self.parameters.filter):
             self.log(state.time, EventKind.CHIEF, "ephemeris goes on from elsewhere: taken up again")
         else:
             self._rejections.add(Rejection.CHIEF, "chief ephemeris")
+
+    def _isolate_chief(self, state: FilterState) -> None:
+        if state.chief.is_isolated:
+            state.chief.is_isolated = False
+            return self._resume_chief(state)
+        age = state.isolate_chief(self.parameters.filter)
+        self.log(state.time, EventKind.CHIEF, f"ephemeris is isolated: propagated from that of {age:.0f} s before")
 
     def _estimate(self, state: FilterState, measurement: Measurement, status: EstimateStatus) -> Estimate | None:
         """Update with the readings, and check consistency; none when the state is lost."""
@@ -291,7 +295,7 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
             if verdict is Verdict.GIVE_UP:
                 self._lose(measurement.time, "readings contradict the state, however uncertain")
                 return None
-            if verdict is Verdict.INFLATE and _has_plausible_fix(measurement):
+            if verdict is Verdict.INFLATE and has_plausible_fix(measurement):
                 return self._estimate(self._acquire(measurement), measurement, EstimateStatus.ACQUIRED)
             if verdict is Verdict.INFLATE:
                 state.filter.covariance = state.observability.inflate(state.filter.covariance, factor)
@@ -337,15 +341,12 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
         pseudo = parameters.pseudo_measurements
         return update(state, readings, design.gate, pseudo, self._rejections, self._isolated)
 
+    def _own_chief(self) -> tuple[int, Vector] | None:
+        """The chief (6,) that is propagated, with its time, ns; that of the state before, where that is lost."""
+        return self._lost_chief if self._state is None else (self._state.time, self._state.chief.state)
+
     def _lose(self, time: int, reason: str) -> None:
         """Lose the state: without an estimate the tick is missed, and the next measurement has a fix."""
+        self._lost_chief = self._own_chief()
         self._state, self._said_that_it_waits = None, True
         self.log(time, EventKind.LOST, f"{reason}: waiting for an acquisition fix")
-
-
-def _has_plausible_fix(measurement: Measurement) -> bool:
-    return (
-        measurement.fix_available
-        and is_plausible_chief(measurement.chief_state)
-        and is_plausible_fix(measurement.fix, measurement.chief_state)
-    )

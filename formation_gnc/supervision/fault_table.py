@@ -9,6 +9,7 @@ from typing import Any
 import yaml
 
 from formation_gnc.errors import ParameterError, nearest
+from formation_gnc.mode_records import CHIEF
 from formation_gnc.parameters import read_yaml
 from formation_gnc.supervision.modes import FAULTS, TRANSITIONS, Mode
 
@@ -21,7 +22,7 @@ class Response(StrEnum):
 
     WARN = "warn"
     ISOLATE_SENSOR = "isolate_sensor"
-    """Navigation goes on without the sensor that is the subject."""
+    """Navigation goes on without the sensor that is the subject, or without the chief's ephemeris."""
     ISOLATE_AXIS = "isolate_axis"
     """The controller does without the axis that is the subject."""
     SWITCH_LAW = "switch_law"
@@ -67,7 +68,7 @@ DEFAULT = (
     "{monitor: covariance, persistence: 600, response: go_to, mode: safe, modes: [keep, reconfigure]}",
     "{monitor: estimate_jump, persistence: 1, response: go_to, mode: acquire, return: 60, modes: [keep, reconfigure]}",
     "{monitor: frozen_estimate, persistence: 1, response: go_to, mode: safe}",
-    "{monitor: chief_ephemeris, persistence: 1, response: warn, return: 60}",
+    "{monitor: chief_ephemeris, persistence: 1, response: isolate_sensor, return: 600}",
     "{monitor: thrust_response, persistence: 1, response: isolate_axis}",
     "{monitor: thruster_on, persistence: 1, response: warn, return: 60}",
     "{monitor: mass, persistence: 1, response: warn, return: 60}",
@@ -161,7 +162,7 @@ class _Parser:
 
     def subject(self, monitor: str, pattern: str, response: Response) -> str:
         known = self.subjects[monitor]
-        about = {"sensor": self.sensors, "axis": self.axes}.get(ABOUT.get(response, ""))
+        about = {"sensor": (*self.sensors, CHIEF), "axis": self.axes}.get(ABOUT.get(response, ""))
         if about is not None and not set(known) <= set(about):
             raise self.rejection(
                 f"{response} needs a monitor of each {ABOUT[response]}; {monitor} is about something else"

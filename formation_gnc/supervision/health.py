@@ -1,13 +1,14 @@
 """All monitors of a satellite, fed tick by tick."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
 from math import isfinite
 
 from formation_gnc.errors import ConfigurationError
+from formation_gnc.flight.module import Condition
 from formation_gnc.records import Estimate, EstimateStatus, Measurement, Status, Target, Thrust
 from formation_gnc.supervision.modes import Mode
-from formation_gnc.supervision.monitor import Monitor, Observation, Verdict, When
+from formation_gnc.supervision.monitor import Level, Monitor, Observation, Verdict, When
 from formation_gnc.supervision.parameters import SupervisorParameters
 from formation_gnc.supervision.reckoning import DeadReckoner, Reckoning
 from formation_gnc.supervision.registry import MONITORS
@@ -102,8 +103,21 @@ class Health:
                     monitor.feed(observation)
                 except Exception as error:  # whatever a plug-in's raises
                     monitor.fail(f"{type(error).__name__}: {error}")
-            self.notable = [each for monitor in self.monitors if monitor.notable for each in monitor.notable.values()]
+            self._note()
         return True
+
+    def begin_anew(self) -> None:
+        """Forget what was of a run of the filter: it goes on from another state, or about another chief."""
+        self._continues = False
+        for monitor in self.monitors:
+            if monitor.is_of_filter:
+                for subject in list(monitor.notable):
+                    monitor.forget(subject)
+                monitor.prepare()
+        self._note()
+
+    def _note(self) -> None:
+        self.notable = [each for monitor in self.monitors if monitor.notable for each in monitor.notable.values()]
 
     def _chosen(self, kinds: int) -> list[Monitor]:
         """Monitors to be fed at a tick of these kinds."""
@@ -131,6 +145,20 @@ class Health:
         """The latest verdict of every monitor on each of its subjects, in the order of the registry."""
         for monitor in self.monitors:
             yield from monitor.verdicts()
+
+    def conditions(self, are_judged: bool) -> list[Condition]:
+        """The latest verdict of every monitor: the worst of its subjects, with all of them as values."""
+        return [condition(each.name, list(each.verdicts()) if are_judged else []) for each in self.monitors]
+
+
+def condition(monitor: str, verdicts: Sequence[Verdict]) -> Condition:
+    """What a monitor says of all its subjects."""
+    values = {each.subject or "statistic": f"{each.statistic:.6g} of {each.threshold:.6g}" for each in verdicts}
+    worst = max((each.level for each in verdicts), default=Level.OK)
+    subjects = [each.subject for each in verdicts if each.level is worst and each.subject]
+    words = {Level.OK: "well", Level.SUSPECT: "suspect", Level.FAILED: "failed"}[worst] if verdicts else "no verdict"
+    message = f"{words}: {', '.join(subjects)}" if subjects and worst is not Level.OK else words
+    return Condition(monitor, int(worst), message, values)
 
 
 def _prepared(kind: type[Monitor], parameters: SupervisorParameters, probability: float) -> Monitor:

@@ -7,6 +7,7 @@ from enum import Flag, IntEnum, auto
 from math import inf, isnan
 from typing import ClassVar
 
+from formation_gnc.mode_records import MonitorStatus
 from formation_gnc.records import Estimate, Measurement, Separation, Status, Target
 from formation_gnc.supervision.modes import Mode
 from formation_gnc.supervision.parameters import SupervisorParameters
@@ -53,6 +54,11 @@ class Verdict:
     reason: str = ""
     """Why there is no statistic, where the monitor itself has failed."""
 
+    @property
+    def status(self) -> MonitorStatus:
+        """The record of it."""
+        return MonitorStatus(self.monitor, self.subject, int(self.level), self.statistic, self.threshold)
+
     def __str__(self) -> str:
         """One line for people."""
         found = self.reason or f"{self.statistic:.3g}, where {self.threshold:.3g} is the limit"
@@ -98,6 +104,8 @@ class Monitor(ABC):
     """How it decides, in words."""
     when: ClassVar[When] = When.SLOW
     """Ticks that it is fed."""
+    is_of_filter: ClassVar[bool] = False
+    """Whether what it remembers is of a run of the filter, and tells nothing of another one."""
 
     def __init__(self, parameters: SupervisorParameters, probability: float) -> None:
         """Prepare for a flight.

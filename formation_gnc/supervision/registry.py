@@ -1,6 +1,9 @@
 """All health monitors by name: a new one is one file in `monitors/` and one line here, or a plug-in."""
 
+from formation_gnc.common import ANY_ORBIT
 from formation_gnc.plugins import load_plugins
+from formation_gnc.sensors.registry import sensors
+from formation_gnc.supervision.fault_table import Entry, parse, table_of
 from formation_gnc.supervision.monitor import Monitor
 from formation_gnc.supervision.monitors.chief_ephemeris import ChiefEphemeris
 from formation_gnc.supervision.monitors.control_error import ControlError
@@ -21,6 +24,8 @@ from formation_gnc.supervision.monitors.separation import Separation
 from formation_gnc.supervision.monitors.solver_fallback import SolverFallback
 from formation_gnc.supervision.monitors.thrust_response import ThrustResponse
 from formation_gnc.supervision.monitors.thruster_on import ThrusterOn
+from formation_gnc.supervision.parameters import SupervisorParameters
+from formation_gnc.types import AXES
 
 MONITORS: dict[str, type[Monitor]] = {
     "innovation_bias": InnovationBias,
@@ -53,3 +58,14 @@ def table() -> str:
     lines = ["| monitor | watches | decides by |", "|---|---|---|"]
     lines += [f"| `{name}` | {monitor.title} | {monitor.test} |" for name, monitor in MONITORS.items()]
     return "\n".join(lines)
+
+
+def read_fault_table(parameters: SupervisorParameters) -> tuple[Entry, ...]:
+    """The fault table of some parameters; raises ParameterError for one that is not allowed."""
+    subjects = {name: monitor.subjects(parameters) for name, monitor in MONITORS.items()}
+    return parse(parameters.fault_table, subjects, tuple(sensors()), AXES)
+
+
+def default_fault_table() -> str:
+    """Markdown table of the default fault table."""
+    return table_of(read_fault_table(SupervisorParameters(ANY_ORBIT)))

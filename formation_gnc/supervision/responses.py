@@ -1,9 +1,10 @@
 """Responses to faults: from the failures of a tick to what is to be done, by the fault table."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Self
 
-from formation_gnc.mode_records import RestrictionKind
+from formation_gnc.mode_records import CHIEF, STATE, Restriction, RestrictionKind
 from formation_gnc.supervision.fault_table import FOREVER, Entry, Response
 from formation_gnc.supervision.modes import Mode
 
@@ -94,8 +95,92 @@ class FaultResponses:
                 active.append(ActiveResponse(entry, subject, entry.response if holds else Response.WARN))
         return active
 
+    def withdraw(self, monitors: Collection[str]) -> None:
+        """End the responses to some monitors: what they have said does not hold any more."""
+        self._cases = {key: case for key, case in self._cases.items() if self._table[key[0]].monitor not in monitors}
+
     def release(self) -> None:
         """End the responses that a command ends, where the fault is over."""
         self._cases = {
             key: case for key, case in self._cases.items() if case.failed or self._table[key[0]].returns != FOREVER
         }
+
+
+@dataclass(slots=True)
+class Renewal:
+    """A state that sensors contradict, begun anew from a fix: once, and again after every thrust."""
+
+    is_due: bool = True
+    """Whether it may be begun anew when it is contradicted."""
+    is_awaited: bool = False
+    """Whether a fix is."""
+    is_over: bool = False
+    """Whether it was: what was contradicted is the thrust told, or what has become of it."""
+    cause: str = ""
+
+    def begun(self, cause: str) -> Self:
+        """The same while a fix is awaited."""
+        return replace(self, is_due=False, is_awaited=True, cause=cause)
+
+    @property
+    def restriction(self) -> Restriction:
+        """What tells navigation."""
+        return Restriction(str(RestrictionKind.SENSOR), STATE, self.cause)
+
+
+@dataclass(slots=True)
+class Restricted:
+    """What modules do without, and whether that leaves a state to steer by."""
+
+    restrictions: list[Restriction] = field(default_factory=list)
+    """Each once; what they did without already goes first."""
+    blinded: str = ""
+    """Why no sensor is left to trust; empty while one is."""
+    is_contradicted: bool = False
+    """Whether that is since innovations accuse too many of them: these, the state or the thrust told are wrong."""
+    accused: tuple[str, ...] = ()
+    """Axes whose force is told as another than commanded."""
+
+    @property
+    def sensors(self) -> set[str]:
+        """Those that navigation does without."""
+        return {each.subject for each in self.restrictions if each.kind == RestrictionKind.SENSOR}
+
+    @property
+    def axes(self) -> set[str]:
+        """Those that modules do without."""
+        return {each.subject for each in self.restrictions if each.kind == RestrictionKind.AXIS}
+
+
+def restricted(
+    active: Sequence[ActiveResponse], sensors: int, before: Sequence[Restriction], force_is_doubted: bool = False
+) -> Restricted:
+    """What modules do without.
+
+    Args:
+        active: responses in force.
+        sensors: number of those in use.
+        before: what they did without.
+        force_is_doubted: whether the force told is wrong, and no reason to do without an axis.
+    """
+    out, left, known = Restricted(), sensors, set[tuple[RestrictionKind, str]]()
+    order = {each.subject for each in before}
+    for each in sorted(active, key=lambda each: each.subject not in order):
+        kind = RESTRICTIONS.get(each.response)
+        if kind is RestrictionKind.AXIS and each.subject not in out.accused:
+            out.accused = (*out.accused, each.subject)
+        if kind is None or (kind is RestrictionKind.AXIS and force_is_doubted):
+            continue
+        for subject in each.entry.laws or (each.subject,):
+            if (kind, subject) in known:
+                continue
+            if kind is RestrictionKind.SENSOR and subject != CHIEF:
+                by_others = each.entry.monitor in BY_INNOVATIONS
+                if left - 1 < (0.5 * sensors if by_others else 1):
+                    out.blinded = f"{each.cause}: {TOO_FEW if by_others else 'the last sensor'}"
+                    out.is_contradicted |= by_others
+                    continue
+                left -= 1
+            known.add((kind, subject))
+            out.restrictions.append(Restriction(str(kind), subject, each.cause))
+    return out

@@ -1,7 +1,7 @@
 """The way out: what a satellite flies in modes in which no law does, and why."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import tau
 from typing import Protocol
 
@@ -38,6 +38,9 @@ DISTRUST = 3.0
 
 _CHIEF = np.zeros((1, 6))
 
+type Factors = tuple[float, float, float]
+"""By axis."""
+
 
 @dataclass(frozen=True)
 class Situation:
@@ -57,6 +60,8 @@ class Situation:
     """Largest one (3,) on each Hill axis, m/s^2; 0 for an axis that does not work."""
     is_trusted: bool = True
     """Whether the state is."""
+    thrust: Sequence[Factors] = ((1.0, 1.0, 1.0),)
+    """What thrusters may do, over what they are commanded on each axis: a plan is as good as the worst of it."""
 
 
 @dataclass(frozen=True)
@@ -99,11 +104,10 @@ def way_out(situation: Situation, horizon: float = HORIZON, urgent: bool = False
     plans = _to_safe_orbits(situation, forecast)
     if urgent:
         plans += _pushes(situation, forecast)
-    plan, outcome = _best(forecast, plans, coasting)
+    plan, outcome = _best(situation, forecast, plans, coasting)
     if outcome.risk > RISK and not urgent:
-        plan, outcome = min(
-            (plan, outcome), _best(forecast, _pushes(situation, forecast), coasting), key=lambda each: each[1].risk
-        )
+        pushed = _best(situation, forecast, _pushes(situation, forecast), coasting)
+        plan, outcome = min((plan, outcome), pushed, key=lambda each: each[1].risk)
     if outcome.risk < 0.5 * coasting.risk:
         aim = "coasting that is safe" if outcome.risk <= RISK else "the least risk there is"
         words = f"burns {_sum(plan):.3g} m/s for {aim}: {_told(outcome)}; coasting now, {_told(coasting)}"
@@ -111,11 +115,27 @@ def way_out(situation: Situation, horizon: float = HORIZON, urgent: bool = False
     return WayOut((), coasting, coasting, f"coasts, since no manoeuvre lowers the risk: {_told(coasting)}")
 
 
-def _best(forecast: Forecast, plans: Sequence[Sequence[Burn]], coasting: Outcome) -> tuple[Sequence[Burn], Outcome]:
+def _best(
+    situation: Situation, forecast: Forecast, plans: Sequence[Sequence[Burn]], coasting: Outcome
+) -> tuple[Sequence[Burn], Outcome]:
     """The plan of least delta-v that is safe, or the one of the least risk; coasting where there is none."""
-    found = sorted(zip(plans, forecast.outcomes(plans), strict=True), key=lambda each: _sum(each[0])) if plans else []
+    worst = _worst(situation, forecast, plans) if plans else []
+    found = sorted(zip(plans, worst, strict=True), key=lambda each: _sum(each[0]))
     safe = (each for each in found if each[1].risk <= RISK)
     return next(safe, None) or min(found, key=lambda each: each[1].risk, default=((), coasting))
+
+
+def _worst(situation: Situation, forecast: Forecast, plans: Sequence[Sequence[Burn]]) -> list[Outcome]:
+    """What comes of each plan at worst, by what the thrusters may do."""
+    every = [
+        forecast.outcomes([[_scaled(burn, factors) for burn in plan] for plan in plans]) for factors in situation.thrust
+    ]
+    return [max(outcomes, key=lambda each: each.risk) for outcomes in zip(*every, strict=True)]
+
+
+def _scaled(burn: Burn, factors: Factors) -> Burn:
+    x, y, z = (factor * each for factor, each in zip(factors, burn.acceleration, strict=True))
+    return replace(burn, acceleration=(x, y, z))
 
 
 def _sum(plan: Sequence[Burn]) -> float:
@@ -166,7 +186,7 @@ def _retreat(situation: Situation, forecast: Forecast, coasting: Outcome) -> Way
         # A lower orbit is faster: backwards to get ahead.
         thrust = -float(np.sign(ahead[0])) * float(situation.acceleration[1])
         plans = [[Burn(0.0, length * forecast.step, (0.0, thrust, 0.0))] for length in PUSHES]
-        best, outcome = _best(forecast, plans, coasting)
+        best, outcome = _best(situation, forecast, plans, coasting)
         if outcome.risk < 0.5 * coasting.risk:
             words = (
                 f"retreats along the track with {_sum(best):.3g} m/s, since {reason} but for the side of the others: "
@@ -233,6 +253,7 @@ def plan_evasion(
     neighbours: Matrix = _CHIEF[:0],
     broken: Collection[str] = (),
     is_trusted: bool = True,
+    doubted: Collection[str] | None = None,
 ) -> Evasion:
     """The plan with which a mode begins.
 
@@ -244,6 +265,8 @@ def plan_evasion(
         neighbours: relative states (N, 6) of the other satellites besides the chief.
         broken: Hill axes that do not work.
         is_trusted: whether the estimate is.
+        doubted: axes whose force is told as another than commanded, where the thrust told does not explain the motion:
+            it may be to the other side, and there may be none on these. None where it is not doubted.
     """
     if estimate is None:
         return Coast(time, "coasts: there is no state to steer by")
@@ -260,6 +283,7 @@ def plan_evasion(
         parameters.least_separation or parameters.tube,
         np.array(limits) / estimate.mass,
         is_trusted,
+        _possible(doubted),
     )
     urgent = mode is Mode.AVOID
     horizon = SOON * tau / parameters.mean_motion if urgent else HORIZON
@@ -268,3 +292,14 @@ def plan_evasion(
     except (ImpactError, ConfigurationError, ValueError) as error:
         return Coast(time, f"coasts: no way out is found, {error}")
     return Manoeuvre(way, time, estimate.mass) if way.burns else Coast(time, way.words)
+
+
+def _possible(doubted: Collection[str] | None) -> list[Factors]:
+    """What thrusters may do: as commanded; where they are doubted, also the opposite, or nothing on some axes."""
+    found: list[Factors] = [(1.0, 1.0, 1.0)]
+    if doubted is not None:
+        found.append((-1.0, -1.0, -1.0))
+    if doubted:
+        x, y, z = (0.0 if axis in doubted else 1.0 for axis in AXES)
+        found.append((x, y, z))
+    return found

@@ -1,21 +1,12 @@
 """Supervision of one deputy, from the records of a tick to its mode and health."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
-from formation_gnc.common import ANY_ORBIT
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight.module import Condition, Configuration, FlightModule
-from formation_gnc.mode_records import (
-    NO_FORCE,
-    HealthReport,
-    Mode,
-    ModeState,
-    MonitorStatus,
-    Restriction,
-    RestrictionKind,
-)
+from formation_gnc.mode_records import CHIEF, NO_FORCE, STATE, HealthReport, Mode, ModeState
 from formation_gnc.parameters import change
 from formation_gnc.records import (
     NO_NEIGHBOURS,
@@ -27,16 +18,21 @@ from formation_gnc.records import (
     Target,
     Thrust,
 )
-from formation_gnc.sensors.registry import sensors
-from formation_gnc.supervision.fault_table import DEFAULT, Entry, Response, parse, table_of
+from formation_gnc.supervision.fault_table import Entry, Response
 from formation_gnc.supervision.health import Health
 from formation_gnc.supervision.modes import COMMANDS, FAULTS, Step, Trigger, refusal, step
 from formation_gnc.supervision.monitor import Level, Verdict
 from formation_gnc.supervision.parameters import SupervisorParameters
-from formation_gnc.supervision.registry import MONITORS
-from formation_gnc.supervision.responses import BY_INNOVATIONS, RESTRICTIONS, TOO_FEW, ActiveResponse, FaultResponses
-from formation_gnc.supervision.safe import Evasion, plan_evasion
-from formation_gnc.types import AXES
+from formation_gnc.supervision.registry import read_fault_table
+from formation_gnc.supervision.responses import (
+    BY_INNOVATIONS,
+    ActiveResponse,
+    FaultResponses,
+    Renewal,
+    Restricted,
+    restricted,
+)
+from formation_gnc.supervision.safe import Coast, Evasion, Manoeuvre, plan_evasion
 
 LEFT = 1.5
 """Control error, over the tube, beyond which the target counts as left."""
@@ -74,9 +70,8 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         self._health = Health(self.parameters)
         self._responses = FaultResponses(self.configuration.design)
         self._active: list[ActiveResponse] = []
-        self._restrictions: list[Restriction] = []
-        self._blinded = ""
-        """Why no sensor is left to trust; empty while one is."""
+        self._restricted = Restricted()
+        self._renewal = Renewal()
         self._failed: dict[tuple[str, str], int] = {}
         """Time (ns) of the latest failure by monitor and subject."""
         self._statuses: list[tuple[str, str, Level]] | None = None
@@ -90,8 +85,7 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
 
     def design(self, parameters: SupervisorParameters) -> Design:
         """The fault table; raises ConfigurationError for one that is not allowed."""
-        subjects = {name: monitor.subjects(parameters) for name, monitor in MONITORS.items()}
-        return parse(parameters.fault_table, subjects, tuple(sensors()), AXES)
+        return read_fault_table(parameters)
 
     def check_staged(self, staged: Configuration[SupervisorParameters, Design]) -> None:
         """Refuse a mode that may not be commanded now."""
@@ -128,7 +122,7 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         if new.design != old.design or "enabled" in new.changes:
             self._responses = FaultResponses(new.design)
             self._report(self.time, [])
-            self._active, self._restrictions, self._blinded = [], [], ""
+            self._active, self._restricted, self._renewal = [], Restricted(), Renewal()
         if new.changes.keys() - {"mode", "fault_table", "schedule"}:
             self._health = Health(new.parameters)
 
@@ -156,6 +150,8 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         if self.parameters.enabled and (before is not None or estimate is not None):
             self._judge(time, before, estimate, target, status, thrust)
         self._before = measurement
+        if self._renewal.is_awaited and estimate is not None and estimate.status == EstimateStatus.ACQUIRED:
+            self._begin_anew(time, estimate, target)
         if self._mode is Mode.AVOID and self._is_restored(target):
             triggers.append(Trigger.SEPARATION_RESTORED)
         return self._decide(time, triggers, estimate, target), self._health_report(time)
@@ -183,9 +179,42 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
             self._failed[key] = time
         active = self._responses.evaluate([(each.monitor, each.subject) for each in failures], ticks, self._mode)
         if active != self._active:
-            self._report(time, active)
-            self._active = active
-            self._restrictions = list(self._restricted())
+            is_isolated = any(each.subject == CHIEF and each.response is Response.ISOLATE_SENSOR for each in active)
+            if is_isolated != (CHIEF in self._restricted.sensors):
+                active = self._withdraw(active)  # accused about another chief
+            self._take(time, active)
+
+    def _take(self, time: int, active: list[ActiveResponse]) -> None:
+        """Take other responses from a time (ns) on."""
+        self._report(time, active)
+        self._active = active
+        before, sensors = self._restricted.restrictions, len(self.parameters.sensors)
+        self._restricted = restricted(active, sensors, before, self._renewal.is_over)
+        if self._renewal.is_awaited:
+            self._restricted.restrictions.append(self._renewal.restriction)
+
+    def _withdraw(self, active: list[ActiveResponse]) -> list[ActiveResponse]:
+        """Responses without those to innovations of the filter, which goes on otherwise, and is judged anew."""
+        self._responses.withdraw(BY_INNOVATIONS)
+        self._health.begin_anew()
+        return [each for each in active if each.entry.monitor not in BY_INNOVATIONS]
+
+    def _await_fix(self, time: int) -> None:
+        """Have navigation begin anew from a fix: too many sensors contradict its state."""
+        self._renewal = self._renewal.begun(self._restricted.blinded)
+        self._restricted.restrictions = [*self._restricted.restrictions, self._renewal.restriction]
+        detail = f"begins: {self._renewal.cause}: navigation begins anew from a fix"
+        self.log(time, EventKind.RESPONSE, detail, STATE)
+
+    def _begin_anew(self, time: int, estimate: Estimate, target: Target | None) -> None:
+        """Find the way out again from a state that has just been acquired; thrust and its telemetry are doubted."""
+        self._renewal = Renewal(is_over=True)
+        self._take(time, self._withdraw(self._active))
+        if self._mode is not Mode.SAFE:
+            return
+        self._evasion = self._way_out(time, estimate, target)
+        self._renewal.is_due = isinstance(self._evasion, Manoeuvre)
+        self.log(time, EventKind.MODE, f"state acquired anew; {self._evasion.words}", str(self._mode))
 
     def _decide(
         self, time: int, triggers: list[Trigger], estimate: Estimate | None, target: Target | None
@@ -194,8 +223,8 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         for each in self._active:
             if each.response is Response.GO_TO and each.entry.mode is not None:
                 faults.setdefault(FAULTS[each.entry.mode], each.cause)
-        if self._blinded and self._mode is not Mode.STANDBY:  # which steers by nothing
-            faults.setdefault(FAULTS[Mode.SAFE], self._blinded)
+        if self._restricted.blinded and self._mode is not Mode.STANDBY:  # which steers by nothing
+            faults.setdefault(FAULTS[Mode.SAFE], self._restricted.blinded)
         if self._command is not None:
             triggers.append(self._command)
         self._command = None
@@ -204,12 +233,16 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
             self.log(time, EventKind.REJECTED, f"{trigger}: {reason}", "mode")
         if decided.mode is not before:
             self._enter(time, decided, faults, estimate, target)
+        elif self._is_fix_due(time):
+            self._await_fix(time)
         self._in_force = before
         if self.parameters.mode != self._mode:
             parameters = change(self.parameters, {"mode": str(self._mode)})
             self.configuration = replace(self.configuration, parameters=parameters)
         force = NO_FORCE if self._evasion is None else self._evasion.force(time + self.parameters.tick_ns)
-        return ModeState(time, str(self._mode), str(before), self._since, self._reason, force, self._restrictions)
+        return ModeState(
+            time, str(self._mode), str(before), self._since, self._reason, force, self._restricted.restrictions
+        )
 
     def _enter(
         self,
@@ -226,23 +259,35 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         self._reason = "" if trigger is None else f"{trigger}, {faults[trigger]}" if trigger in faults else str(trigger)
         detail = f"from {before}: {self._reason}"
         self._evasion = None
+        if before is Mode.SAFE:
+            self._renewal = Renewal()
+            self._take(time, self._active)
         if self._mode in EVASIVE:
-            self._evasion = self._way_out(estimate, target)
+            self._evasion = self._way_out(time, estimate, target)
             detail += f"; {self._evasion.words}"
         self.log(time, EventKind.MODE, detail, str(self._mode))
 
-    def _way_out(self, estimate: Estimate | None, target: Target | None) -> Evasion:
+    def _is_fix_due(self, time: int) -> bool:
+        """Whether sensors contradict the state in `safe`, and it was not begun anew since the last thrust."""
+        if self._mode is not Mode.SAFE or not self._restricted.is_contradicted or not self._renewal.is_due:
+            return False
+        return self._evasion is None or time >= self._evasion.end
+
+    def _way_out(self, time: int, estimate: Estimate | None, target: Target | None) -> Evasion:
         """The way out: away from the neighbours that guidance knows, with the axes that work."""
-        broken = {each.subject for each in self._restrictions if each.kind == RestrictionKind.AXIS}
+        start = time + self.parameters.tick_ns
+        if self._mode is Mode.SAFE and self._restricted.is_contradicted and self._renewal.is_due:
+            return Coast(start, "coasts until navigation has begun anew from a fix")
         failing = {each.monitor for each in self._health.notable if each.level is Level.FAILED}
         return plan_evasion(
             self._mode,
-            self._since,
+            start,
             estimate,
             self.parameters,
             NO_NEIGHBOURS if target is None else target.neighbours,
-            broken,
-            not self._blinded and UNTRUSTED.isdisjoint(failing),
+            self._restricted.axes,
+            not self._restricted.blinded and UNTRUSTED.isdisjoint(failing),
+            self._restricted.accused if self._renewal.is_over else None,
         )
 
     def _events(self, estimate: Estimate | None, target: Target | None) -> list[Trigger]:
@@ -281,26 +326,6 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
             if each.entry.response is not Response.WARN:
                 self.log(time, EventKind.RESPONSE, f"{verb}: {each}", each.subject)
 
-    def _restricted(self) -> Iterator[Restriction]:
-        """What modules do without, each once; what they did without already goes first."""
-        self._blinded = ""
-        known = set[tuple[RestrictionKind, str]]()
-        sensors_left = len(self.parameters.sensors)
-        before = {each.subject for each in self._restrictions}
-        for each in sorted(self._active, key=lambda each: each.subject not in before):
-            kind = RESTRICTIONS.get(each.response)
-            for subject in each.entry.laws or (each.subject,) if kind else ():
-                if kind is None or (kind, subject) in known:
-                    continue
-                if kind is RestrictionKind.SENSOR:
-                    by_others = each.entry.monitor in BY_INNOVATIONS
-                    if sensors_left - 1 < (0.5 * len(self.parameters.sensors) if by_others else 1):
-                        self._blinded = f"{each.cause}: {TOO_FEW if by_others else 'the last sensor'}"
-                        continue
-                    sensors_left -= 1
-                known.add((kind, subject))
-                yield Restriction(str(kind), subject, each.cause)
-
     def _health_report(self, time: int) -> HealthReport | None:
         """The verdicts that are not well, where subjects or levels have changed."""
         notable = self._health.notable if self.parameters.enabled else []
@@ -311,32 +336,8 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         if statuses == self._statuses:
             return None
         self._statuses = statuses
-        return HealthReport(
-            time,
-            [
-                MonitorStatus(each.monitor, each.subject, int(each.level), each.statistic, each.threshold)
-                for each in notable
-            ],
-        )
+        return HealthReport(time, [each.status for each in notable])
 
     def conditions(self) -> list[Condition]:
         """The latest verdict of every monitor: the worst of its subjects, with all of them as values."""
-        by_monitor: dict[str, list[Verdict]] = {name: [] for name in MONITORS}
-        for verdict in self._health.verdicts() if self.parameters.enabled else ():
-            by_monitor[verdict.monitor].append(verdict)
-        return [_condition(name, verdicts) for name, verdicts in by_monitor.items()]
-
-
-def _condition(monitor: str, verdicts: list[Verdict]) -> Condition:
-    values = {each.subject or "statistic": f"{each.statistic:.6g} of {each.threshold:.6g}" for each in verdicts}
-    worst = max((each.level for each in verdicts), default=Level.OK)
-    subjects = [each.subject for each in verdicts if each.level is worst and each.subject]
-    words = {Level.OK: "well", Level.SUSPECT: "suspect", Level.FAILED: "failed"}[worst] if verdicts else "no verdict"
-    message = f"{words}: {', '.join(subjects)}" if subjects and worst is not Level.OK else words
-    return Condition(monitor, int(worst), message, values)
-
-
-def default_fault_table() -> str:
-    """Markdown table of the default fault table."""
-    subjects = {name: monitor.subjects(SupervisorParameters(ANY_ORBIT)) for name, monitor in MONITORS.items()}
-    return table_of(parse(DEFAULT, subjects, tuple(sensors()), AXES))
+        return self._health.conditions(self.parameters.enabled)

@@ -79,6 +79,33 @@ def test_a_flight_with_faults_has_its_bits_on_graph_in_process_and_again(
         assert identical(recorded, Bag(other), [*gnc_topics(recorded), "/events"]) == []
 
 
+def test_a_state_begun_anew_has_its_bits_on_graph_and_again(fly: Callable[..., Bag], tmp_path: Path) -> None:
+    """Two sensors off at once: the state is given up, and a fix taken; the chief's ephemeris is isolated besides."""
+    scenario = yaml.safe_load(find_scenario("leader_follower").read_text())
+    scenario["/plant"]["ros__parameters"]["faults"] = [
+        "{at: 60.0, deputy: deputy1, fault: chief_drift, rate: [0.0, 1.0, 0.0]}",
+        "{at: 105.0, until: 156.0, deputy: deputy1, fault: bias, sensor: radius, value: 20.0}",
+        "{at: 105.0, until: 156.0, deputy: deputy1, fault: bias, sensor: range_rate, value: 0.04}",
+    ]
+    scenario["/**/supervisor"] = {"ros__parameters": {"schedule": ["{at: 250.0, mode: acquire}"]}}
+    path = tmp_path / "anew.yaml"
+    path.write_text(yaml.safe_dump(scenario))
+    recorded = fly("--duration", "300", "--set", "plant.deadline=10.0", scenario=str(path))
+    restricted = recorded.arrays("/deputy1/mode")["restrictions.0.subject"]
+    assert "chief" in restricted
+    given_up = [
+        each for each in recorded.arrays("/events")["detail"] if "the supervisor does not trust the state" in each
+    ]
+    assert len(given_up) == 1
+    inside, again = tmp_path / "inside", tmp_path / "again"
+    assert main(["sil", str(path), "--duration", "300", "--in-process", "--bag", str(inside), "--accept-lost"]) == 0
+    assert main(["replay", str(recorded.path), "--bag", str(again)]) == 0
+    # the tick without an estimate waits for the deadline on the graph alone, and its event says so
+    topics = [each for each in gnc_topics(recorded) if each != "/events"]
+    for other in (inside, again):
+        assert identical(recorded, Bag(other), topics) == []
+
+
 def test_nodes_restarted_with_other_parameters_replay_with_them(desk: Desk, capsys: pytest.CaptureFixture[str]) -> None:
     bag = desk.directory / "bag"
     plant, terminals = desk.take_off()

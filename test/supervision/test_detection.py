@@ -44,10 +44,10 @@ FAULTS: dict[str, tuple[str, str, str, int]] = {
     "force told as none": ("fault: force_zero", "thrust_response", "*", 600),
     "mass told as a hundredth": ("fault: mass_scale, factor: 0.01", "mass", "", 10),
     "mass told tenfold": ("fault: mass_scale, factor: 10.0", "mass", "", 10),
-    "chief's ephemeris frozen": ("fault: chief_freeze", "chief_ephemeris", "", 15),
-    "chief's ephemeris off by 100 m": ("fault: chief_jump, offset: [0.0, 100.0, 0.0]", "chief_ephemeris", "", 15),
+    "chief's ephemeris frozen": ("fault: chief_freeze", "chief_ephemeris", "chief", 15),
+    "chief's ephemeris off by 100 m": ("fault: chief_jump, offset: [0.0, 100.0, 0.0]", "chief_ephemeris", "chief", 15),
     # 1 m + 2.2e-4 m/s^2 t^2 is passed after 23 s by a window that begins with it; by one that has begun, later
-    "chief's ephemeris drifting": ("fault: chief_drift, rate: [0.0, 0.0, 0.05]", "chief_ephemeris", "", 95),
+    "chief's ephemeris drifting": ("fault: chief_drift, rate: [0.0, 0.0, 0.05]", "chief_ephemeris", "chief", 95),
 }
 
 # Subjects that are accused after the right one.

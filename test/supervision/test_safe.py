@@ -126,6 +126,22 @@ def test_an_untrusted_state_is_not_steered_by_but_retreated_from() -> None:
     assert "no direction is certain" in stay.words
 
 
+def test_a_way_out_is_safe_whichever_side_thrust_is_to() -> None:
+    """Thrust that may be to the other side: the risk is that of the worse one, and both end above the limit."""
+    given = situation(relative=np.array([2.0, -100.0, 3.0, 0.002, -0.004, 0.0]))
+    way = way_out(replace(given, thrust=((1.0, 1.0, 1.0), (-1.0, -1.0, -1.0))))
+    assert way.burns
+    assert way.coasting.risk > 0.05
+    assert way.outcome.risk <= RISK
+    assert way.delta_v > way_out(given).delta_v
+    opposite = [
+        replace(each, acceleration=(-each.acceleration[0], -each.acceleration[1], -each.acceleration[2]))
+        for each in way.burns
+    ]
+    assert flown(given, way, given.relative) > LIMIT
+    assert flown(given, replace(way, burns=opposite), given.relative) > LIMIT
+
+
 def test_an_encounter_within_a_revolution_is_avoided_at_once() -> None:
     """Drifting towards the chief at 80 m a revolution from 100 m behind, 8.5 m below: two hours to the encounter."""
     n = float(np.sqrt(3.986004418e14 / 6978100.0**3))

@@ -8,11 +8,11 @@ import pytest
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.mode_records import NO_FORCE, HealthReport, ModeState, RestrictionKind
-from formation_gnc.records import Event, EventKind, Innovation, Rejection, Separation
+from formation_gnc.records import EstimateStatus, Event, EventKind, Innovation, Rejection, Separation
 from formation_gnc.supervision.supervisor import Supervisor
-from formation_gnc.types import NANOSECONDS
+from formation_gnc.types import NANOSECONDS, Vector
 
-from .test_monitors import parameters, records
+from .test_monitors import CHIEFS, parameters, records
 
 OFF = np.array([0.0, -250.0, 0.0, 0.0, 0.0, 0.0])
 
@@ -245,19 +245,50 @@ def test_what_is_isolated_is_judged_further_and_returns_when_it_is_well() -> Non
     assert 600 < end < 900
 
 
+def contradict(module: Supervisor, number: int, *sensors: str, chief: Vector = NO_FORCE, **changes: Any) -> ModeState:
+    """A tick at which some sensors are far off the state, and the chief is told somewhere else."""
+    innovations = [
+        replace(each, values=[each.values[0] + 5.0 * (each.sensor in sensors)])
+        for each in records(number)[1].innovations  # type: ignore[union-attr]
+    ]
+    told = CHIEFS[number % len(CHIEFS)] + np.concatenate([chief, NO_FORCE])
+    state, _ = tick(module, number, measurement={"chief_state": told}, estimate={"innovations": innovations} | changes)
+    return state
+
+
 def test_a_second_sensor_that_contradicts_the_state_leads_to_safe() -> None:
     """Of three, one is isolated; with a second one accused it may be the motion that is not as told."""
     module = supervisor()
     for number in range(0, 400):
-        shifts = {"radius": 5.0, "latitude": 5.0 if number >= 200 else 0.0}
-        innovations = [
-            replace(each, values=[each.values[0] + shifts.get(each.sensor, 0.0)])
-            for each in records(number)[1].innovations  # type: ignore[union-attr]
-        ]
-        state, _ = tick(module, number, estimate={"innovations": innovations})
+        state = contradict(module, number, "radius", *["latitude"] * (number >= 200))
         if number == 199:
             assert without(state, RestrictionKind.SENSOR) == ["radius"]
             assert state.mode == "keep"
-    assert without(state, RestrictionKind.SENSOR) == ["radius"]
+    assert without(state, RestrictionKind.SENSOR) == ["radius", "state"]
     assert state.mode == "safe"
     assert state.reason.endswith("latitude: too few sensors are left to say which are wrong")
+    assert not state.force.any()
+
+
+def test_a_state_begun_anew_gives_the_sensors_back_and_a_way_out() -> None:
+    """After a fix nobody is accused, and the way out is found from it."""
+    module = supervisor()
+    for number in range(0, 400):
+        contradict(module, number, "radius", "latitude")
+    module.take_events()
+    state = contradict(module, 400, status=EstimateStatus.ACQUIRED)
+    assert without(state, RestrictionKind.SENSOR) == []
+    assert any(each.detail.startswith("state acquired anew; ") for each in module.take_events())
+    assert {contradict(module, number, "radius", "latitude").mode for number in range(401, 600)} == {"safe"}
+
+
+def test_sensors_accused_about_a_wrong_chief_are_given_back() -> None:
+    """The ephemeris is what is isolated, and not the sensor that contradicted the state about it."""
+    module, off = supervisor(), np.array([0.0, 5000.0, 0.0])
+    for number in range(0, 290):
+        state = contradict(module, number, "radius")
+    assert without(state, RestrictionKind.SENSOR) == ["radius"]
+    for number in range(290, 312):
+        state = contradict(module, number, chief=off)
+    assert without(state, RestrictionKind.SENSOR) == ["chief"]
+    assert state.restrictions[0].reason == "chief_ephemeris chief"

@@ -4,7 +4,7 @@
 `flown.csv`, table by table, and writes docs/verification/faults.md from all that is kept.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from itertools import product
 from pathlib import Path
@@ -35,6 +35,7 @@ A fault does harm if the error without supervision exceeds {HARM:g} m or a separ
 Such a fault has to be found before half of that error, and to end `kept` (in `keep`, within {HELD:g} m) or `safe`.
 What falls short of that is marked. Flown in-process by `python -m verification.faults`: {DETAILED} on the scenarios'
 ticks of {OWN_TICK:g} s, all laws on ticks of {TICK:g} s. Laws with a final time have handed over to LQR by the onset.
+A table is flown as a whole and kept; which ones are missing, and why, stands below the first.
 """
 
 HEAD = (
@@ -46,17 +47,23 @@ HEAD = (
 WITHOUT = "The first three figures are of the flight without supervision, all others of the flight with it."
 
 
-def tables(names: Sequence[str]) -> Iterator[tuple[str, str, float]]:
-    """Formation, law and tick (s) of each table; laws that cannot be designed for a formation have none."""
+def wanted(names: Sequence[str] = ()) -> Iterator[tuple[str, str, float]]:
+    """Formation, law and tick (s) of each table of the named formations and laws, or of all."""
     formations, laws = ([each for each in every if each in names] or every for every in (FORMATIONS, ALGORITHMS))
     for formation, law in product(formations, laws):
         if law == DETAILED:
             yield formation, law, OWN_TICK
+        yield formation, law, TICK
+
+
+def tables(names: Sequence[str]) -> Iterator[tuple[str, str, float]]:
+    """The tables that can be flown: laws that cannot be designed for a formation have none."""
+    for formation, law, tick in wanted(names):
         try:
-            Run(scenario(formation, law, TICK))
+            Run(scenario(formation, law, tick))
         except DesignError:
             continue
-        yield formation, law, TICK
+        yield formation, law, tick
 
 
 def fly_table(formation: str, law: str, tick: float, pool: ProcessPoolExecutor) -> list[Outcome]:
@@ -87,6 +94,7 @@ def page(outcomes: Sequence[Outcome]) -> tuple[str, list[Figure]]:
         cells = formation, law, f"{tick:g}", len(rows), harmful, late, len(short), which
         lines.append(f"| {' | '.join(map(str, cells))} |")
         figures.append(Figure(f"{formation}, {law}, {tick:g} s: short", "0", len(short), "faults", 0.0, 0.0))
+    lines += ["", *missing(by_table)]
     for (formation, law, tick), rows in by_table.items():
         if law == DETAILED:
             lines += [
@@ -99,11 +107,20 @@ def page(outcomes: Sequence[Outcome]) -> tuple[str, list[Figure]]:
                 *(row.line for row in rows),
             ]
     for formation in FORMATIONS:
-        lines += [
-            "",
-            *matrix(formation, {key[1]: rows for key, rows in by_table.items() if key[::2] == (formation, TICK)}),
-        ]
+        by_law = {key[1]: rows for key, rows in by_table.items() if key[::2] == (formation, TICK)}
+        lines += ["", *matrix(formation, by_law)] if by_law else []
     return "\n".join(lines).rstrip() + "\n", figures
+
+
+def missing(flown: Collection[tuple[str, str, float]]) -> Iterator[str]:
+    """Lines of what is not flown: laws that a formation's scenario refuses, with the reason, and the others."""
+    for formation, law, tick in wanted():
+        if (formation, law, tick) not in flown:
+            try:
+                Run(scenario(formation, law, tick))
+                yield f"- {formation}, {law}, {tick:g} s: not flown"
+            except DesignError as error:
+                yield f"- {formation}, {law}, {tick:g} s: refused, {error}"
 
 
 def matrix(formation: str, by_law: dict[str, list[Outcome]]) -> Iterator[str]:

@@ -148,11 +148,19 @@ def _advance(state: Array, duration: float, steps: int) -> None:
             state[c] += h / 6.0 * (rates[0, c] + 2.0 * rates[1, c] + 2.0 * rates[2, c] + rates[3, c])
 
 
+def largest_unmodelled(radius: float) -> float:
+    """Bound of the acceleration beyond point mass and J2 at a radius (m), m/s^2."""
+    return GRAVITY * (EARTH_RADIUS / radius) ** 4 + OTHER
+
+
+_bound = inline(largest_unmodelled)
+
+
 @inline
 def _unmodelled(state: Array) -> tuple[float, float]:
     """Radius (m) of an inertial state, and the largest acceleration beyond point mass and J2 there, m/s^2."""
     radius = sqrt(state[0] * state[0] + state[1] * state[1] + state[2] * state[2])
-    return radius, GRAVITY * (EARTH_RADIUS / radius) ** 4 + OTHER
+    return radius, _bound(radius)
 
 
 @inline

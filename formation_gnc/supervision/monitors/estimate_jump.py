@@ -18,6 +18,7 @@ class EstimateJump(Monitor):
     name = "estimate_jump"
     title = "estimate against its own propagation"
     test = "normal, six components"
+    is_of_filter = True
 
     def prepare(self) -> None:
         """Thresholds."""

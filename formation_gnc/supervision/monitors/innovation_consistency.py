@@ -31,6 +31,7 @@ class InnovationConsistency(Monitor):
     title = "size of all innovations"
     test = f"chi-square limit of the NIS over {WINDOW} updates"
     when = When.READINGS
+    is_of_filter = True
 
     def prepare(self) -> None:
         """An empty window."""

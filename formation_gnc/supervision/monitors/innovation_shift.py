@@ -20,6 +20,7 @@ class InnovationShift(Monitor):
     Delay: close to (h + 1.2) / (shift - k) readings, with the shift in standard deviations, of which three count.
     """
 
+    is_of_filter = True
     reference: ClassVar[float]
     """Half the shift that it is made for, k, standard deviations."""
 

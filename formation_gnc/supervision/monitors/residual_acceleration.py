@@ -24,6 +24,7 @@ class ResidualAcceleration(Monitor):
     name = "residual_acceleration"
     title = "acceleration that the thrust told does not explain, each axis"
     test = "normal, position and rate after up to five minutes"
+    is_of_filter = True
 
     def prepare(self) -> None:
         """Thresholds."""
