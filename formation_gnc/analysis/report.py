@@ -148,7 +148,7 @@ def _summary(run: RunHistory, bag: Bag) -> dict[str, Any]:
 def _figure_table(bag: Bag) -> str:
     """Figures of merit of the deputies, and the law that each flew at the end."""
     deputies = figures(bag).deputies
-    values = {name: each.by_name() for name, each in deputies.items()}
+    values = {name: each.shown() for name, each in deputies.items()}
     head = "".join(f"<th>{escape(name)}</th>" for name in deputies)
     rows = [("control law at the end", [each.law for each in deputies.values()])]
     rows += [("mode at the end", [each.mode for each in deputies.values()])]

@@ -315,7 +315,7 @@ def _print_figures(console: Console, title: str, result: "RunFigures") -> None:
     from formation_gnc.analysis.figure_table import FIGURES
     from formation_gnc.commands.tables import print_table
 
-    by_deputy = {name: each.by_name() for name, each in result.deputies.items()}
+    by_deputy = {name: each.shown() for name, each in result.deputies.items()}
     if len(by_deputy) > COLUMNS:
         columns = [["deputy", *by_deputy]]
         for figure in FIGURES:

@@ -72,6 +72,8 @@ def same(one: Bag, other: Bag) -> bool:
 )
 def test_data_is_read_where_the_summary_is_silent(tmp_path, bag_path, flight, options) -> None:
     bag = Bag(write_mcap(tmp_path / "other.mcap", written(flight), **options))
+    recovery = recover(bag.path, None)
+    assert (recovery.status, recovery.saved, recovery.reasons) == (WHOLE, len(flight), ())
     assert {name: topic.count for name, topic in bag.topics.items()} == {
         name: topic.count for name, topic in Bag(bag_path).topics.items()
     }
