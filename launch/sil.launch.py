@@ -2,13 +2,15 @@
 
 `ros2 launch formation_gnc sil.launch.py scenario:=tetrahedral use_composition:=true bag:=bags/fleet`
 
-It can be included, below a namespace too: each namespace is a formation of its own, with a `/clock` of its own.
+It can be included, below a namespace too: each namespace is a formation of its own, with a `/clock` of its own, and
+the end of its flight ends its nodes alone.
 """
 
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
-from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
+from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction
+from launch.events.process import ShutdownProcess
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
@@ -85,9 +87,13 @@ def nodes(context: LaunchContext) -> list[Node]:
 
     plant = {"wait_for_recorder": given["record"], "seed": given["seed"]}
     plant["duration"] = str(float(given["duration"])) if given["duration"] else ""
-    law = {"algorithm": given["controller"]}
+    law = {
+        "controller:algorithm": given["controller"]
+    }  # by its name, since a satellite is several nodes in one process
     again = {"respawn": is_on["use_respawn"], "respawn_delay": 1.0}
-    started = [node("plant", own=plant, on_exit=Shutdown(reason="the flight is over"))]
+    # The flight's own nodes end with it, and nothing else of a launch description that includes this one.
+    over = EmitEvent(event=ShutdownProcess(process_matcher=lambda process: process in started))
+    started = [node("plant", own=plant, on_exit=over)]
     if is_on["record"]:
         started.append(node("recorder", own={"bag": given["bag"]}))
     if is_on["display"]:

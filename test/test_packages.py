@@ -300,8 +300,10 @@ def launch_double(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
         "launch.actions": {
             "DeclareLaunchArgument": lambda name, **options: Declared(name=name, **options),
             "OpaqueFunction": Function,
-            "Shutdown": SimpleNamespace,
+            "EmitEvent": SimpleNamespace,
         },
+        "launch.events": {},
+        "launch.events.process": {"ShutdownProcess": SimpleNamespace},
         "launch.substitutions": {"LaunchConfiguration": configuration},
         "launch_ros": {},
         "launch_ros.actions": {"Node": SimpleNamespace},
@@ -338,6 +340,14 @@ def test_launch_file_takes_a_path_and_defaults_to_leader_follower(launch_double,
     assert nodes[0].parameters == [str(path)]
 
 
+def test_the_end_of_a_flight_ends_its_own_nodes_alone(launch_double):
+    """Another formation of the same launch flies on."""
+    one, two = (started(launch_double, namespace=name, display="true") for name in ("one", "two"))
+    ends = one[0].on_exit.event.process_matcher
+    assert [node.executable for node in one if not ends(node)] == []
+    assert [node.namespace for node in two if ends(node)] == []
+
+
 def test_launch_arguments_reach_the_nodes_that_they_are_for(launch_double):
     given = {"seed": "7", "duration": "90", "controller": "mpc", "bag": "bags/x", "use_sim_time": "true"}
     nodes = started(launch_double, namespace="alpha", display="true", use_respawn="true", log_level="warn", **given)
@@ -347,7 +357,7 @@ def test_launch_arguments_reach_the_nodes_that_they_are_for(launch_double):
         assert "--log-level warn -p use_sim_time:=true" in each
     assert words["plant"].endswith("-p wait_for_recorder:=true -p seed:=7 -p duration:=90.0")
     assert words["recorder"].endswith("-p bag:=bags/x")
-    assert words["controller"].endswith("-p algorithm:=mpc")
+    assert words["controller"].endswith("-p controller:algorithm:=mpc")
     assert [name for name, each in words.items() if "mpc" in each] == ["controller"]
     assert {node.namespace for node in nodes} == {"alpha", "alpha/deputy1"}
     assert {node.executable for node in nodes if getattr(node, "respawn", False)} == NODES - {"plant", "recorder"}

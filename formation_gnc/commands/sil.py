@@ -320,7 +320,10 @@ def _print_figures(console: Console, title: str, result: "RunFigures") -> None:
         columns = [["deputy", *by_deputy]]
         for figure in FIGURES:
             columns.append(
-                [fill(figure.label, HEADING), *(figure.text(values[figure.name]) for values in by_deputy.values())]
+                [
+                    fill(figure.label, HEADING, break_long_words=False),
+                    *(figure.text(values[figure.name]) for values in by_deputy.values()),
+                ]
             )
     else:
         columns = [["figure", *(figure.label for figure in FIGURES)]]
