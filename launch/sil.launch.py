@@ -11,11 +11,13 @@ from pathlib import Path
 from ament_index_python.packages import get_package_share_directory
 from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction
 from launch.events.process import ShutdownProcess
+from launch.logging import launch_config
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from formation_gnc.flight.graph import MODULES
 from formation_gnc.parameters import read_yaml
+from formation_gnc.sil.scenario import EXTENDS, load_scenario
 from formation_gnc.transport.security import check_secured, variables
 from launch import LaunchContext, LaunchDescription
 
@@ -64,7 +66,7 @@ def nodes(context: LaunchContext) -> list[Node]:
     path = Path(given["scenario"])
     if not path.suffix:
         path = Path(get_package_share_directory("formation_gnc"), "params", f"{given['scenario']}.yaml")
-    files = [str(path), *([given["params_file"]] if given["params_file"] else [])]
+    files = [str(readable_by_ros(path)), *([given["params_file"]] if given["params_file"] else [])]
     for_all = ["--log-level", given["log_level"]] if given["log_level"] else []
     for_all += ["-p", "use_sim_time:=true"] if is_on["use_sim_time"] else []
     keystore = Path(given["keystore"]) if given["keystore"] else None
@@ -106,6 +108,15 @@ def nodes(context: LaunchContext) -> list[Node]:
     if keystore:
         check_secured(keystore, enclaves)  # raises before anything is started
     return started
+
+
+def readable_by_ros(path: Path) -> Path:
+    """A scenario's file; where it extends another scenario, which ROS does not know, a file with all that results."""
+    if EXTENDS not in (read_yaml(path.read_text()) or {}):
+        return path
+    whole = Path(launch_config.log_dir, path.name)
+    whole.write_text(load_scenario(str(path)).text())
+    return whole
 
 
 def deputies(files: list[str]) -> list[str]:

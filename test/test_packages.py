@@ -23,6 +23,7 @@ from formation_gnc import records
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight.access import access_by_process
 from formation_gnc.messages.conversion import type_name
+from formation_gnc.parameters import read_yaml
 from formation_gnc.sil.scenario import load_scenario
 from formation_gnc.transport import security
 from formation_gnc.transport.keystore import make_keystore
@@ -277,7 +278,7 @@ def test_the_launch_file_starts_every_node():
 
 
 @pytest.fixture
-def launch_double(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+def launch_double(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> SimpleNamespace:
     """A stand-in for the launch packages, with as much of them as the launch file uses; gives the context."""
 
     class Declared(SimpleNamespace):
@@ -304,6 +305,7 @@ def launch_double(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
         },
         "launch.events": {},
         "launch.events.process": {"ShutdownProcess": SimpleNamespace},
+        "launch.logging": {"launch_config": SimpleNamespace(log_dir=str(tmp_path))},
         "launch.substitutions": {"LaunchConfiguration": configuration},
         "launch_ros": {},
         "launch_ros.actions": {"Node": SimpleNamespace},
@@ -338,6 +340,19 @@ def test_launch_file_takes_a_path_and_defaults_to_leader_follower(launch_double,
     nodes = started(launch_double, scenario=str(path))
     assert {node.namespace for node in nodes} == {"", "deputy1"}
     assert nodes[0].parameters == [str(path)]
+
+
+def test_the_launch_file_flies_what_a_scenario_extends(launch_double, tmp_path):
+    """ROS reads no file with `extends`: its nodes get one with all that results."""
+    own = tmp_path / "own" / "pair.yaml"
+    own.parent.mkdir()
+    own.write_text("extends: tetrahedral\n/plant: {ros__parameters: {duration: 90.0}}\n")
+    nodes = started(launch_double, scenario=str(own))
+    (file,) = {path for node in nodes for path in node.parameters}
+    assert Path(file).name == own.name
+    assert {node.namespace for node in nodes} == {"", *load_scenario("tetrahedral").plant.deputies}
+    assert "extends" not in read_yaml(Path(file).read_text())
+    assert load_scenario(file) == load_scenario(str(own))
 
 
 def test_the_end_of_a_flight_ends_its_own_nodes_alone(launch_double):
