@@ -55,7 +55,7 @@ def write_report(bag: Bag, run: RunHistory, path: Path, title: str, origin: Orig
     Returns:
         The path.
     """
-    origin = origin or Origin(str(bag.path), digest_of(bag.path))
+    origin = origin or Origin(str(bag.path), digest_of(bag.source))
     sections = [_badge(origin), _replay(run, bag)]
     tables = {"Summary": table(_summary(run, bag)), "Figures": _figure_table(bag)}
     told = "".join(f"<div><h2>{heading}</h2>{each}</div>" for heading, each in tables.items())
