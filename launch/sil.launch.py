@@ -2,18 +2,22 @@
 
 `ros2 launch formation_gnc sil.launch.py scenario:=tetrahedral use_composition:=true bag:=bags/fleet`
 
-It can be included, below a namespace too: each namespace is a formation of its own, with a `/clock` of its own.
+It can be included, below a namespace too: each namespace is a formation of its own, with a `/clock` of its own, and
+the end of its flight ends its nodes alone.
 """
 
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
-from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
+from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction
+from launch.events.process import ShutdownProcess
+from launch.logging import launch_config
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from formation_gnc.flight.graph import MODULES
 from formation_gnc.parameters import read_yaml
+from formation_gnc.sil.scenario import EXTENDS, load_scenario
 from formation_gnc.transport.security import check_secured, variables
 from launch import LaunchContext, LaunchDescription
 
@@ -62,7 +66,7 @@ def nodes(context: LaunchContext) -> list[Node]:
     path = Path(given["scenario"])
     if not path.suffix:
         path = Path(get_package_share_directory("formation_gnc"), "params", f"{given['scenario']}.yaml")
-    files = [str(path), *([given["params_file"]] if given["params_file"] else [])]
+    files = [str(readable_by_ros(path)), *([given["params_file"]] if given["params_file"] else [])]
     for_all = ["--log-level", given["log_level"]] if given["log_level"] else []
     for_all += ["-p", "use_sim_time:=true"] if is_on["use_sim_time"] else []
     keystore = Path(given["keystore"]) if given["keystore"] else None
@@ -85,9 +89,13 @@ def nodes(context: LaunchContext) -> list[Node]:
 
     plant = {"wait_for_recorder": given["record"], "seed": given["seed"]}
     plant["duration"] = str(float(given["duration"])) if given["duration"] else ""
-    law = {"algorithm": given["controller"]}
+    law = {
+        "controller:algorithm": given["controller"]
+    }  # by its name, since a satellite is several nodes in one process
     again = {"respawn": is_on["use_respawn"], "respawn_delay": 1.0}
-    started = [node("plant", own=plant, on_exit=Shutdown(reason="the flight is over"))]
+    # The flight's own nodes end with it, and nothing else of a launch description that includes this one.
+    over = EmitEvent(event=ShutdownProcess(process_matcher=lambda process: process in started))
+    started = [node("plant", own=plant, on_exit=over)]
     if is_on["record"]:
         started.append(node("recorder", own={"bag": given["bag"]}))
     if is_on["display"]:
@@ -100,6 +108,15 @@ def nodes(context: LaunchContext) -> list[Node]:
     if keystore:
         check_secured(keystore, enclaves)  # raises before anything is started
     return started
+
+
+def readable_by_ros(path: Path) -> Path:
+    """A scenario's file; where it extends another scenario, which ROS does not know, a file with all that results."""
+    if EXTENDS not in (read_yaml(path.read_text()) or {}):
+        return path
+    whole = Path(launch_config.log_dir, path.name)
+    whole.write_text(load_scenario(str(path)).text())
+    return whole
 
 
 def deputies(files: list[str]) -> list[str]:

@@ -131,6 +131,19 @@ SWAPS = """
 """
 
 
+@pytest.mark.thorough
+def test_each_run_of_a_joined_bag_has_a_page(reference: Path, other: Path, tmp_path: Path) -> None:
+    bags = Bag(reference), Bag(other)
+    with BagWriter(tmp_path / "both", {}) as writer:
+        for topic in bags[0].topics:
+            writer.add_defined_topic(topic, TopicDefinition.recorded(*bags[0].definition(topic)))
+        for bag in bags:
+            for topic, data, stamp in bag.messages():
+                writer.write(topic, data, stamp, 1)
+    assert main(["report", str(tmp_path / "both"), "--output", str(tmp_path / "page.html")]) == 0
+    assert sorted(path.name for path in tmp_path.glob("page*")) == ["page_run1.html", "page_run2.html"]
+
+
 @pytest.mark.parametrize("nodes", ["navigation,guidance,controller", "controller", "navigation", "guidance"])
 def test_an_unchanged_replay_gives_the_recorded_bits(
     reference: Path, tmp_path: Path, nodes: str, capsys: pytest.CaptureFixture[str]

@@ -23,6 +23,7 @@ from formation_gnc import records
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight.access import access_by_process
 from formation_gnc.messages.conversion import type_name
+from formation_gnc.parameters import read_yaml
 from formation_gnc.sil.scenario import load_scenario
 from formation_gnc.transport import security
 from formation_gnc.transport.keystore import make_keystore
@@ -277,7 +278,7 @@ def test_the_launch_file_starts_every_node():
 
 
 @pytest.fixture
-def launch_double(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+def launch_double(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> SimpleNamespace:
     """A stand-in for the launch packages, with as much of them as the launch file uses; gives the context."""
 
     class Declared(SimpleNamespace):
@@ -300,8 +301,11 @@ def launch_double(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
         "launch.actions": {
             "DeclareLaunchArgument": lambda name, **options: Declared(name=name, **options),
             "OpaqueFunction": Function,
-            "Shutdown": SimpleNamespace,
+            "EmitEvent": SimpleNamespace,
         },
+        "launch.events": {},
+        "launch.events.process": {"ShutdownProcess": SimpleNamespace},
+        "launch.logging": {"launch_config": SimpleNamespace(log_dir=str(tmp_path))},
         "launch.substitutions": {"LaunchConfiguration": configuration},
         "launch_ros": {},
         "launch_ros.actions": {"Node": SimpleNamespace},
@@ -338,6 +342,27 @@ def test_launch_file_takes_a_path_and_defaults_to_leader_follower(launch_double,
     assert nodes[0].parameters == [str(path)]
 
 
+def test_the_launch_file_flies_what_a_scenario_extends(launch_double, tmp_path):
+    """ROS reads no file with `extends`: its nodes get one with all that results."""
+    own = tmp_path / "own" / "pair.yaml"
+    own.parent.mkdir()
+    own.write_text("extends: tetrahedral\n/plant: {ros__parameters: {duration: 90.0}}\n")
+    nodes = started(launch_double, scenario=str(own))
+    (file,) = {path for node in nodes for path in node.parameters}
+    assert Path(file).name == own.name
+    assert {node.namespace for node in nodes} == {"", *load_scenario("tetrahedral").plant.deputies}
+    assert "extends" not in read_yaml(Path(file).read_text())
+    assert load_scenario(file) == load_scenario(str(own))
+
+
+def test_the_end_of_a_flight_ends_its_own_nodes_alone(launch_double):
+    """Another formation of the same launch flies on."""
+    one, two = (started(launch_double, namespace=name, display="true") for name in ("one", "two"))
+    ends = one[0].on_exit.event.process_matcher
+    assert [node.executable for node in one if not ends(node)] == []
+    assert [node.namespace for node in two if ends(node)] == []
+
+
 def test_launch_arguments_reach_the_nodes_that_they_are_for(launch_double):
     given = {"seed": "7", "duration": "90", "controller": "mpc", "bag": "bags/x", "use_sim_time": "true"}
     nodes = started(launch_double, namespace="alpha", display="true", use_respawn="true", log_level="warn", **given)
@@ -347,7 +372,7 @@ def test_launch_arguments_reach_the_nodes_that_they_are_for(launch_double):
         assert "--log-level warn -p use_sim_time:=true" in each
     assert words["plant"].endswith("-p wait_for_recorder:=true -p seed:=7 -p duration:=90.0")
     assert words["recorder"].endswith("-p bag:=bags/x")
-    assert words["controller"].endswith("-p algorithm:=mpc")
+    assert words["controller"].endswith("-p controller:algorithm:=mpc")
     assert [name for name, each in words.items() if "mpc" in each] == ["controller"]
     assert {node.namespace for node in nodes} == {"alpha", "alpha/deputy1"}
     assert {node.executable for node in nodes if getattr(node, "respawn", False)} == NODES - {"plant", "recorder"}

@@ -62,8 +62,8 @@ Every parameter of every node, from the schemas that the nodes themselves check 
 
 A scenario is one ROS 2 parameter file for all nodes: `params/leader_follower.yaml` shows how. With
 `extends: leader_follower`, a key beside the nodes, it holds only what differs from that scenario or file;
-`formation-gnc` reads it so, while ROS itself takes no such key. `formation-gnc check SCENARIO` shows the values that
-result, where each comes from, and what to think of before the flight.
+`formation-gnc` and the launch file read it so, ROS itself takes no such key. `formation-gnc check SCENARIO` shows the
+values that result, where each comes from, and what to think of before the flight.
 """
 
 FAULTS_INTRODUCTION = f"""

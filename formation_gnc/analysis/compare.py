@@ -43,15 +43,15 @@ def gnc_topics(*bags: Bag) -> list[str]:
     )
 
 
-def run_figures(bag: Bag) -> dict[str, dict[str, float | str]]:
+def run_figures(bag: Bag) -> dict[str, dict[str, float | str | None]]:
     """Figures of a run by name, for the run as a whole ("") and for each deputy.
 
     Raises:
         BagError: no truth, or a deputy without estimates or targets.
     """
     result = figures(bag)
-    table: dict[str, dict[str, float | str]] = {"": {"ticks": result.ticks, "misses": result.misses}}
-    return table | {name: deputy.by_name() for name, deputy in result.deputies.items()}
+    table: dict[str, dict[str, float | str | None]] = {"": {"ticks": result.ticks, "misses": result.misses}}
+    return table | {name: deputy.shown() for name, deputy in result.deputies.items()}
 
 
 @np.errstate(all="ignore")  # what a bag holds may be as large as a float

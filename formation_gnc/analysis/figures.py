@@ -51,6 +51,10 @@ class DeputyFigures:
         values["nis_band"] = " to ".join(f"{bound:.3f}" for bound in self.nis_band)
         return values
 
+    def shown(self) -> dict[str, float | str | None]:
+        """Figures by name as tables show them: no NIS where no innovation says one, rather than one of zero."""
+        return self.by_name() | ({} if any(self.nis_band) else {"nis_ratio": None, "nis_band": "no innovations"})
+
 
 @dataclass(frozen=True)
 class RunFigures:

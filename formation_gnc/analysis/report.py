@@ -55,7 +55,7 @@ def write_report(bag: Bag, run: RunHistory, path: Path, title: str, origin: Orig
     Returns:
         The path.
     """
-    origin = origin or Origin(str(bag.path), digest_of(bag.path))
+    origin = origin or Origin(str(bag.path), digest_of(bag.source))
     sections = [_badge(origin), _replay(run, bag)]
     tables = {"Summary": table(_summary(run, bag)), "Figures": _figure_table(bag)}
     told = "".join(f"<div><h2>{heading}</h2>{each}</div>" for heading, each in tables.items())
@@ -148,7 +148,7 @@ def _summary(run: RunHistory, bag: Bag) -> dict[str, Any]:
 def _figure_table(bag: Bag) -> str:
     """Figures of merit of the deputies, and the law that each flew at the end."""
     deputies = figures(bag).deputies
-    values = {name: each.by_name() for name, each in deputies.items()}
+    values = {name: each.shown() for name, each in deputies.items()}
     head = "".join(f"<th>{escape(name)}</th>" for name in deputies)
     rows = [("control law at the end", [each.law for each in deputies.values()])]
     rows += [("mode at the end", [each.mode for each in deputies.values()])]

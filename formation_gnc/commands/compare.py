@@ -19,7 +19,7 @@ from formation_gnc.commands.tables import print_table
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.recording import Difference, identical
 
-RunFigures = dict[str, dict[str, float | str]]
+RunFigures = dict[str, dict[str, float | str | None]]
 """Figures by name, by deputy; of the run as a whole by ""."""
 
 IDENTICAL = "identical on every GNC topic"
@@ -69,7 +69,7 @@ def _summary(paths: list[Path], figures: list[RunFigures], differences: list[lis
                     part: {
                         name: value - other
                         for name, value in values.items()
-                        if not isinstance(value, str) and not isinstance(other := first[part][name], str)
+                        if not isinstance(value, str | None) and not isinstance(other := first[part][name], str | None)
                     }
                     for part, values in each.items()
                     if part in first

@@ -60,4 +60,4 @@ def write_page_of(bag: Bag, history: "RunHistory", path: Path, title: str, repla
     from formation_gnc.analysis.report import Origin, write_report
 
     differences = [str(each) for each in differences_of_replay(bag)] if replayed else None
-    return write_report(bag, history, path, title, Origin(str(bag.path), digest_of(bag.path), differences))
+    return write_report(bag, history, path, title, Origin(str(bag.path), digest_of(bag.source), differences))

@@ -315,12 +315,15 @@ def _print_figures(console: Console, title: str, result: "RunFigures") -> None:
     from formation_gnc.analysis.figure_table import FIGURES
     from formation_gnc.commands.tables import print_table
 
-    by_deputy = {name: each.by_name() for name, each in result.deputies.items()}
+    by_deputy = {name: each.shown() for name, each in result.deputies.items()}
     if len(by_deputy) > COLUMNS:
         columns = [["deputy", *by_deputy]]
         for figure in FIGURES:
             columns.append(
-                [fill(figure.label, HEADING), *(figure.text(values[figure.name]) for values in by_deputy.values())]
+                [
+                    fill(figure.label, HEADING, break_long_words=False),
+                    *(figure.text(values[figure.name]) for values in by_deputy.values()),
+                ]
             )
     else:
         columns = [["figure", *(figure.label for figure in FIGURES)]]

@@ -7,8 +7,10 @@ function.
 """
 
 import os
+import shutil
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -36,21 +38,38 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def _cache_directory(folder: str, key: str = "") -> str:
-    """First writable directory for the compiled kernels of a folder; empty when there is none."""
+    """First writable directory for the compiled kernels of a folder; empty when there is none.
+
+    It begins with what another user, as the one who installed the package, left compiled where this one may not write:
+    numba uses no directory that it may only read, and compiling takes minutes.
+    """
     digest = sha256(key.encode())
     for source in (source for each in SOURCES[folder] for source in sorted((_PACKAGE / each).rglob("*.py"))):
         digest.update(source.read_bytes())
+    name = f"kernels-{digest.hexdigest()[:16]}"
+    compiled: Path | None = None
     for root in (numba.config.CACHE_DIR, _PACKAGE / "orbit" / "__pycache__", _user_cache() / "formation_gnc"):
         if not root:
             continue
-        directory = Path(root) / f"kernels-{digest.hexdigest()[:16]}"
+        directory = Path(root) / name
         try:
+            if compiled and not directory.exists():
+                _copy(compiled, directory)
             directory.mkdir(parents=True, exist_ok=True)
             tempfile.TemporaryFile(dir=directory).close()
         except OSError:
+            compiled = compiled or (directory if directory.is_dir() else None)
             continue
         return str(directory)
     return ""
+
+
+def _copy(compiled: Path, directory: Path) -> None:
+    """Copy compiled kernels; whole or not at all, since other processes may do the same at the same time."""
+    directory.parent.mkdir(parents=True, exist_ok=True)
+    # Not all may be read, or another process was faster.
+    with tempfile.TemporaryDirectory(dir=directory.parent) as whole, suppress(OSError):
+        shutil.copytree(compiled, Path(whole) / directory.name).rename(directory)
 
 
 def _user_cache() -> Path:

@@ -1,6 +1,7 @@
 """Runs of a bag, each in order of stamp: what was recorded twice, out of order, or of several runs on end."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -18,6 +19,10 @@ PIECES = 3
 
 _FREE = {topics.EVENTS.name, topics.TIMING.name}
 """Names of topics of several publishers, whose stamps may repeat and go back."""
+
+
+_NOISY = {topics.MEASUREMENT.name, topics.ESTIMATE.name}
+"""Names of a deputy's topics that a run's seed decides."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +93,8 @@ def separate(recorded: Mapping[str, Recorded], path: str) -> list[RunOrder]:
     """
     pace = pacing_topic({topic: len(each.stamps) for topic, each in recorded.items()})
     starts = _starts(recorded[pace], pace, path) if pace else [0]
+    if len(starts) == 1 and pace and np.any(np.diff(recorded[pace].stamps) < 0):
+        starts = _starts_of_noise(recorded, path) or starts
     runs = []
     for number, start in enumerate(starts):
         run = RunOrder()
@@ -121,6 +128,18 @@ def _starts(pacing: Recorded, topic: str, path: str) -> list[int]:
     if len(starts) > 1 and len(edges) - 1 > PIECES * len(starts):
         raise _interleaved(path, topic, conflict)
     return starts
+
+
+def _starts_of_noise(recorded: Mapping[str, Recorded], path: str) -> list[int]:
+    """Positions at which runs begin whose truth is the same, as of flights that differ in their seed and only coast."""
+    for topic in sorted(recorded, key=lambda name: (not name.endswith(f"/{topics.MEASUREMENT.name}"), name)):
+        if topic.rpartition("/")[2] not in _NOISY:
+            continue
+        with suppress(BagError):  # these may be mixed where the truth is not
+            starts = _starts(recorded[topic], topic, path)
+            if len(starts) > 1:
+                return starts
+    return []
 
 
 def _interleaved(path: str, topic: str, stamp: int) -> BagError:

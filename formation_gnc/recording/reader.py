@@ -43,6 +43,7 @@ class Bag:
     twice count once, and those of each topic come in order of stamp.
 
     Attributes:
+        path: name of the bag, of a run of it with the run's number; `source` is where it is.
         topics: by name.
         metadata: MCAP metadata records by name, the provenance of the run among them.
         attachments: files carried in the bag, by name.
@@ -59,7 +60,7 @@ class Bag:
 
     def __init__(self, path: str | Path) -> None:
         """Open a bag by its directory or file."""
-        self.path = Path(path)
+        self.path = self.source = Path(path)
         self._contents = contents = BagContents(self.path)
         self.metadata, self.attachments, self.damage = contents.metadata, contents.attachments, contents.damage
         counts = self.metadata.get(LOST, {})

@@ -89,6 +89,16 @@ class _Survey:
     misfits: dict[str, tuple[int, str]] = field(default_factory=dict)
     """By topic, how many messages do not fit their type, and where the first one stands."""
 
+    def define(self, summary: Summary | None, reader: "SalvageReader | SqliteSalvage") -> None:
+        """Take schemas and channels: from a summary if it repeats each, which it need not, or else from the data."""
+        if summary is not None:
+            self.schemas, self.channels = summary.schemas, summary.channels
+            if _defines_all(summary):
+                return
+        for record in reader.records():  # a definition may stand behind messages of it, when the one before is lost
+            if isinstance(record, Group):
+                self.add_definitions(record)
+
     def note_misfits(self, group: Group, saved: Counter[int]) -> None:
         """Note the messages of a group that do not fit, after so many of each channel that do."""
         for record in group.records:
@@ -152,12 +162,7 @@ def _surveyed(path: Path, unpack: Unpack) -> _Survey:
         raise BagError(f"{path}: is compressed as a whole; unpack it first, as by `zstd -d`")
     with path.open("rb") as stream:
         summary = verified_summary(stream)
-        if summary is not None:
-            survey.schemas, survey.channels = summary.schemas, summary.channels
-        else:  # a definition may stand behind messages of it, when the one before them is lost
-            for record in _reader(path, stream).records():
-                if isinstance(record, Group):
-                    survey.add_definitions(record)
+        survey.define(summary, _reader(path, stream))
         reader = _reader(path, stream)
         for record in reader.records():
             match record:
@@ -181,6 +186,13 @@ def _surveyed(path: Path, unpack: Unpack) -> _Survey:
         survey.reasons.append(f"{path}: {count} messages of {topic} do not fit their type, first {first}")
         survey.lost[topic] = max(survey.lost[topic], count)
     return survey
+
+
+def _defines_all(summary: Summary) -> bool:
+    """Whether a summary has the channel of every message, and its schema."""
+    if summary.statistics is None or not summary.statistics.channel_message_counts.keys() <= summary.channels.keys():
+        return False
+    return all(not each.schema_id or each.schema_id in summary.schemas for each in summary.channels.values())
 
 
 def _missing(summary: Summary | None, found: Counter[int], indexed: Counter[int]) -> Counter[int]:

@@ -52,6 +52,26 @@ def test_cache_of_a_read_only_package_is_the_users(roots, monkeypatch):
     assert Path(directory("orbit")).parent == roots / "user" / "formation_gnc"
 
 
+def test_what_was_compiled_at_the_installation_serves_every_user(roots, monkeypatch):
+    """Whoever may read the package but not write to it, as the user of a container, compiles nothing again."""
+    installed = Path(directory("orbit"))
+    (installed / "orbit_1").mkdir()
+    (installed / "orbit_1" / "twice.nbi").write_bytes(b"index")
+    write = tempfile.TemporaryFile
+
+    def reject(dir):
+        if Path(dir).is_relative_to(roots / "user"):
+            return write(dir=dir)
+        raise PermissionError(dir)
+
+    monkeypatch.setattr(jit.tempfile, "TemporaryFile", reject)
+    for _ in range(2):
+        own = Path(directory("orbit"))
+        assert own.parent == roots / "user" / "formation_gnc"
+        assert (own / "orbit_1" / "twice.nbi").read_bytes() == b"index"
+        assert [each.name for each in own.parent.iterdir()] == [own.name], "nothing is left half copied"
+
+
 def test_without_a_writable_directory_there_is_no_cache(roots, monkeypatch):
     def reject(dir):
         raise PermissionError(dir)

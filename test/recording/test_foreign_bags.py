@@ -72,6 +72,8 @@ def same(one: Bag, other: Bag) -> bool:
 )
 def test_data_is_read_where_the_summary_is_silent(tmp_path, bag_path, flight, options) -> None:
     bag = Bag(write_mcap(tmp_path / "other.mcap", written(flight), **options))
+    recovery = recover(bag.path, None)
+    assert (recovery.status, recovery.saved, recovery.reasons) == (WHOLE, len(flight), ())
     assert {name: topic.count for name, topic in bag.topics.items()} == {
         name: topic.count for name, topic in Bag(bag_path).topics.items()
     }
@@ -167,6 +169,20 @@ def test_runs_on_end_are_told_apart(tmp_path, bag_path, flight) -> None:
     assert same(first, Bag(bag_path))
     assert same(second, other)
     assert {first.topics[name].count == second.topics[name].count for name in bag.topics} == {True}
+
+
+def test_runs_with_the_same_truth_are_told_apart(tmp_path, bag_path, flight) -> None:
+    """Flights that only coast differ by their seed in what is measured and estimated, not in where they are."""
+    seed = [
+        message._replace(data=message.data[:-1] + bytes([message.data[-1] ^ 1]))
+        if message.topic in ("/deputy1/measurement", "/deputy1/estimate")
+        else message
+        for message in flight
+    ]
+    first, second = Bag(write_mcap(tmp_path / "both.mcap", [*written(flight), *written(seed)])).runs()
+    assert same(first, Bag(bag_path))
+    assert same(second, Bag(write_mcap(tmp_path / "seed.mcap", written(seed))))
+    assert {first.topics[name].count == second.topics[name].count for name in first.topics} == {True}
 
 
 def test_interleaved_runs_are_rejected(tmp_path, flight) -> None:

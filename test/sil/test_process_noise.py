@@ -1,8 +1,9 @@
 """Process noise that the truth's forces ask of a filter."""
 
+import numpy as np
 import pytest
 
-from formation_gnc.sil.process_noise import process_noise_warnings, unmodelled_density
+from formation_gnc.sil.process_noise import _density, process_noise_warnings, unmodelled_density
 from formation_gnc.sil.scenario import find_scenario, load_scenario
 
 
@@ -16,6 +17,16 @@ def test_differential_sunlight_asks_for_the_square_of_its_acceleration() -> None
     density = unmodelled_density(load_scenario("geostationary").plant, "deputy1")
     acceleration = (2.0 * 1.4 / 100.0 - 20.0 * 1.3 / 1000.0) * 4.56e-6
     assert density == pytest.approx(acceleration**2 / 2.0 * 13713.0, rel=0.3)
+
+
+@pytest.mark.parametrize("turns", [0.0, 0.5, 1.0, 3.0, 20.0])
+def test_density_is_the_square_times_the_time_in_which_it_changes(turns: float) -> None:
+    """A sine's time is one over its rate; one of less than a turn, or a constant, turns with the orbit all the same."""
+    rate, points, size = 1.1e-3, 4000, 3e-9
+    step = 2.0 * np.pi / rate / points
+    wave = size * np.cos(turns * rate * step * np.arange(points))
+    expected = np.mean(wave**2) / rate / max(turns, 1.0)
+    assert _density(np.outer(wave, [0.1, 1.0, 0.0]), step, 1.0 / rate) == pytest.approx(expected, rel=0.01)
 
 
 @pytest.mark.parametrize(
