@@ -21,7 +21,7 @@ from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 
 from formation_gnc.flight import topics
-from formation_gnc.transport.node import Executor
+from formation_gnc.transport.loop import Executor
 from formation_gnc.transport.qos import LATEST, quality
 
 STAMP = struct.Struct("<i")

@@ -1,21 +1,29 @@
-"""Subscriptions that know the publisher of each message, which rclpy of Jazzy leaves out of what it hands on."""
+"""Subscriptions that know the publisher of each message, which rclpy of Jazzy leaves out of what it hands on.
+
+They are not rclpy's, and no executor of it serves them: its task for each message takes longer than the message
+itself. The middleware counts what comes on an event descriptor of the system, without the interpreter, and who serves
+the node polls those (:class:`Inbox`).
+"""
 
 import ctypes
+import os
 import struct
 from collections.abc import Callable
+from contextlib import suppress
+from select import EPOLLIN, epoll
 from typing import Any
+from weakref import WeakKeyDictionary
 
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.type_support import check_is_valid_msg_type
-from rclpy.waitable import NumberOfEntities, Waitable
 
 from formation_gnc.flight.reception import Information
 
 BURST = 100
-"""Messages taken at once; then timers have their turn, whoever floods the topic."""
+"""Messages taken at once; then other topics and timers have their turn, whoever floods this one."""
 
 UNNUMBERED = 2**64 - 1
 """Sequence number of a middleware that has none."""
@@ -63,18 +71,16 @@ _take = _rcl.rcl_take_serialized_message
 _take.argtypes = [ctypes.c_void_p] * 4
 _notify = _rcl.rcl_subscription_set_on_new_message_callback
 _notify.argtypes = [ctypes.c_void_p] * 3
+_count = ctypes.cast(ctypes.CDLL(None).eventfd_write, ctypes.c_void_p)
+"""Called by the middleware with what it was given, the descriptor, and the number of new messages."""
 _default_allocator = _rcutils.rcutils_get_default_allocator
 _default_allocator.restype = _Allocator
 _release = _rcutils.rcutils_uint8_array_fini
 _release.argtypes = [ctypes.c_void_p]
 
 
-class IdentifiedSubscription(Waitable):  # type: ignore[misc]
-    """Calls back with the CDR bytes of a topic's messages, and with what is known of each.
-
-    A waitable, since rclpy's own subscriptions are taken from by rclpy. It does its work where it is asked whether
-    there is any: the task that rclpy makes of it otherwise takes longer than the message itself.
-    """
+class IdentifiedSubscription:
+    """Calls back with the CDR bytes of a topic's messages, and with what is known of each."""
 
     def __init__(
         self,
@@ -85,18 +91,24 @@ class IdentifiedSubscription(Waitable):  # type: ignore[misc]
         profile: QoSProfile,
         events: SubscriptionEventCallbacks,
     ) -> None:
-        """Subscribe a node to a topic of a message class."""
-        super().__init__(node.default_callback_group)
+        """Subscribe a node to a topic of a message class; its messages are in the node's inbox."""
         check_is_valid_msg_type(kind)
         with node.handle:
-            self.handle = rclpy_implementation.Subscription(node.handle, kind, topic, profile.get_c_qos_profile())
-        self._node, self._callback, self._is_silent = node, callback, False
+            self._handle = rclpy_implementation.Subscription(node.handle, kind, topic, profile.get_c_qos_profile())
+        self._node, self._callback = node, callback
         self._buffer, self._info = _Buffer(allocator=_default_allocator()), _MessageInfo()
-        addresses = self.handle.pointer, ctypes.addressof(self._buffer), ctypes.addressof(self._info)
+        addresses = self._handle.pointer, ctypes.addressof(self._buffer), ctypes.addressof(self._info)
         self._arguments = *map(ctypes.c_void_p, addresses), None
-        self._waitables = [self, *events.create_event_handlers(node.default_callback_group, self.handle, topic)]
-        for each in self._waitables:
+        self._events = events.create_event_handlers(node.default_callback_group, self._handle, topic)
+        for each in self._events:
             node.add_waitable(each)
+        self._new = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
+        inbox_of(node).add(self)
+        _notify(self._handle.pointer, _count, self._new)
+
+    def fileno(self) -> int:
+        """The descriptor that is readable while messages wait."""
+        return self._new
 
     def take(self) -> tuple[bytes, Information] | None:
         """The next message; None when there is none."""
@@ -112,72 +124,88 @@ class IdentifiedSubscription(Waitable):  # type: ignore[misc]
             "publication_sequence_number": None if number == UNNUMBERED else number,
         }
 
-    def is_ready(self, _wait_set: Any) -> bool:
-        """Take what is there, though the executor asks once for each message.
+    def receive(self) -> None:
+        """Take the messages that were counted, or the first of them."""
+        count = 0
+        with suppress(BlockingIOError):  # a look was faster
+            count = os.eventfd_read(self._new)
+        if count > BURST:
+            os.eventfd_write(self._new, count - BURST)
+        self._receive(min(count, BURST))
 
-        It asks slowly: a stranger's burst would push out of the queue what is awaited, and a message that nobody
-        was told of would wait for the next one, which in lock-step waits for it.
-        """
-        for _ in range(0 if self._is_silent else BURST):
+    def look(self) -> None:
+        """Take what is there, counted or not: in lock-step a message that nobody was told of is waited for."""
+        self._receive(BURST)
+
+    def _receive(self, count: int) -> None:
+        for _ in range(count):
             message = self.take()
             if message is None:
                 break
             self._callback(*message)
-        return False
-
-    def get_num_entities(self) -> NumberOfEntities:
-        """One subscription."""
-        return NumberOfEntities(1, 0, 0, 0, 0, 0)
-
-    def add_to_wait_set(self, wait_set: Any) -> None:
-        """Wait for messages."""
-        wait_set.add_subscription(self.handle)
-
-    def take_data(self) -> None:
-        """Nothing is left for a task."""
-
-    async def execute(self, taken_data: Any) -> None:
-        """Nothing is left for a task."""
-
-    def silence(self) -> None:
-        """Take no more messages.
-
-        To come before `destroy`, with the executor at work in between: a message that it has noticed and not asked for
-        would have it end what is destroyed without the interpreter's lock, and crash.
-        """
-        self._is_silent = True
-        _notify(self.handle.pointer, None, None)
 
     def destroy(self) -> None:
-        """Unsubscribe; after `silence`."""
-        for each in self._waitables:
+        """Unsubscribe."""
+        _notify(self._handle.pointer, None, None)
+        for each in self._events:
             self._node.remove_waitable(each)
-        for handler in self._waitables[1:]:
-            handler.destroy()
-        self.handle.destroy_when_not_in_use()
-
-    def __enter__(self) -> None:
-        """Keep the middleware's part alive."""
-        self.handle.__enter__()
-
-    def __exit__(self, *error: object) -> None:
-        """Let it go."""
-        self.handle.__exit__(*error)
+            each.destroy()
+        self._handle.destroy_when_not_in_use()
+        inbox_of(self._node).remove(self)
+        os.close(self._new)
 
     def __del__(self) -> None:
         """Give the buffer back."""
         _release(ctypes.addressof(self._buffer))
 
 
-def unsubscribe(node: Node, executor: Any = None) -> None:
-    """Destroy all identified subscriptions of a node, which rclpy leaves alone; `executor`: the one that serves it."""
-    subscriptions = [each for each in node.waitables if isinstance(each, IdentifiedSubscription)]
-    for each in subscriptions:
-        each.silence()
-    if executor is not None:
-        executor.spin_once(timeout_sec=0.0)
-    for each in subscriptions:
-        each.destroy()
+class Inbox:
+    """The messages that wait in a node's identified subscriptions."""
+
+    def __init__(self) -> None:
+        """No subscriptions."""
+        self._poll = epoll()
+        self._subscriptions: dict[int, IdentifiedSubscription] = {}
+
+    def fileno(self) -> int:
+        """The descriptor that is readable while messages wait."""
+        return self._poll.fileno()
+
+    def add(self, subscription: IdentifiedSubscription) -> None:
+        """Receive a subscription's messages from now on."""
+        self._subscriptions[subscription.fileno()] = subscription
+        self._poll.register(subscription, EPOLLIN)
+
+    def remove(self, subscription: IdentifiedSubscription) -> None:
+        """Receive them no longer."""
+        del self._subscriptions[subscription.fileno()]
+        self._poll.unregister(subscription)
+
+    def receive(self) -> None:
+        """Receive messages that wait, a burst of each topic at most."""
+        for descriptor, _ in self._poll.poll(0):
+            if descriptor in self._subscriptions:  # not destroyed by what came before
+                self._subscriptions[descriptor].receive()
+
+    def look(self) -> None:
+        """Receive what nobody was told of as well."""
+        for each in list(self._subscriptions.values()):
+            each.look()
+
+    def clear(self) -> None:
+        """Destroy all subscriptions, which rclpy leaves alone."""
+        for each in list(self._subscriptions.values()):
+            each.destroy()
+
+
+_inboxes: WeakKeyDictionary[Node, Inbox] = WeakKeyDictionary()
+
+
+def inbox_of(node: Node) -> Inbox:
+    """The inbox of a node, made when it is first asked for."""
+    if node not in _inboxes:
+        _inboxes[node] = Inbox()
+    return _inboxes[node]
 
 
 def identities(node: Node, topic: str) -> dict[bytes, str]:

@@ -11,16 +11,9 @@ from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rcl_interfaces.srv import SetParameters
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.task import Future
 from rclpy.timer import Timer
-
-try:
-    from rclpy.experimental import EventsExecutor
-except ImportError:  # missing in other builds of Jazzy; slower, same behaviour
-    EventsExecutor = SingleThreadedExecutor
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
@@ -31,15 +24,14 @@ from formation_gnc.messages.conversion import codec, received
 from formation_gnc.parameters import OWN_OF_ROS, Leaf, change, dump, leaves, load, read_yaml
 from formation_gnc.records import WARNINGS, Event, EventKind
 from formation_gnc.sil.following import departures, values_of_plant, with_followed
-from formation_gnc.transport.identified import identities, unsubscribe
+from formation_gnc.transport.identified import identities, inbox_of
+from formation_gnc.transport.loop import Loop
 from formation_gnc.transport.message_types import message_type
 from formation_gnc.transport.parameter_arguments import given_parameters, without_parameters
 from formation_gnc.transport.process import stop_requested
 from formation_gnc.transport.qos import quality
 from formation_gnc.transport.subscriptions import subscribe_to_all
 from formation_gnc.types import NANOSECONDS
-
-Executor: Any = EventsExecutor
 
 CHECK_PERIOD = 0.1
 """Wall time (s) after which a node notices at the latest that it has been asked to stop."""
@@ -64,7 +56,7 @@ class ConfiguredNode(Node):  # type: ignore[misc]
 
         namespace: of the node within its formation, unless it is remapped; empty or one token.
         """
-        self._served_by: Any = None
+        self._loop: Loop | None = None
         self.receptions: list[Reception[Any]] = []
         super().__init__(name, namespace=namespace, cli_args=without_parameters(sys.argv), use_global_arguments=False)
         full_name, depth = self.get_fully_qualified_name(), 2 if namespace else 1
@@ -235,21 +227,18 @@ class ConfiguredNode(Node):  # type: ignore[misc]
         self, ended: Callable[[], bool] = stop_requested, period: Callable[[], float] = lambda: CHECK_PERIOD
     ) -> None:
         """Serve callbacks until `ended`, checked every `period` (s), returns true."""
-        if self._served_by is None:
-            serve(self)
+        loop = self._loop or serve(self)
         while not ended():
-            self._served_by.spin_until_future_complete(Future(), timeout_sec=period())
+            loop.spin(period())
 
     def destroy_node(self) -> None:
         """Leave only when every reader has what was published."""
         deadline = monotonic() + FAREWELL
         for publisher in self.publishers:
             publisher.wait_for_all_acked(Duration(seconds=max(0.0, deadline - monotonic())))
-        unsubscribe(self, self._served_by)
-        if self._served_by is not None:
-            self._served_by.remove_node(self)
-            if not self._served_by.get_nodes():
-                self._served_by.shutdown()
+        if self._loop is not None:
+            self._loop.remove(self)
+        inbox_of(self).clear()
         super().destroy_node()
 
 
@@ -290,12 +279,12 @@ def rejected(request: Any, response: Any, reason: str) -> Any:
     return response
 
 
-def serve(*nodes: ConfiguredNode) -> None:
-    """Let one executor serve nodes for all their life: a second one would lose what the first had noticed."""
-    executor = Executor()
+def serve(*nodes: ConfiguredNode) -> Loop:
+    """Let one loop serve nodes for all their life."""
+    loop = Loop(*nodes)
     for node in nodes:
-        executor.add_node(node)
-        node._served_by = executor
+        node._loop = loop
+    return loop
 
 
 def _descriptor(leaf: Leaf) -> ParameterDescriptor:

@@ -5,14 +5,13 @@ from collections.abc import Callable
 import rclpy
 from rclpy.context import Context
 from rclpy.signals import SignalHandlerOptions
-from rclpy.task import Future
 
 from formation_gnc.flight import topics
 from formation_gnc.flight.reception import Information
 from formation_gnc.recording.live import LiveView
 from formation_gnc.recording.topic_definition import TopicDefinition
-from formation_gnc.transport.identified import unsubscribe
-from formation_gnc.transport.node import Executor
+from formation_gnc.transport.identified import inbox_of
+from formation_gnc.transport.loop import Loop
 from formation_gnc.transport.raw_topics import Callback, RawTopics
 
 LOOK_PERIOD = 0.5
@@ -24,8 +23,7 @@ def show_graph(view: LiveView, ended: Callable[[], bool]) -> None:
     context = Context()
     rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("view", context=context, start_parameter_services=False)
-    executor = Executor(context=context)
-    executor.add_node(node)
+    loop = Loop(node, context=context)
 
     def open_topic(topic: str, type_name: str, _latched: bool) -> Callback:
         view.add(topic, TopicDefinition.installed(type_name, topics.QUEUE_DEPTH))
@@ -42,8 +40,9 @@ def show_graph(view: LiveView, ended: Callable[[], bool]) -> None:
     try:
         while not ended():
             everything.look()
-            executor.spin_until_future_complete(Future(), timeout_sec=LOOK_PERIOD)
+            loop.spin(LOOK_PERIOD)
     finally:
-        unsubscribe(node, executor)
+        loop.remove(node)
+        inbox_of(node).clear()
         node.destroy_node()
         rclpy.try_shutdown(context=context)

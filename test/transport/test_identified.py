@@ -1,4 +1,4 @@
-"""Subscriptions that come and go under an executor, which crashes where one is destroyed with messages in its queue."""
+"""Subscriptions that come and go in a flood of messages, and the loop that serves them."""
 
 import os
 import subprocess
@@ -13,8 +13,8 @@ import os, threading, time
 import rclpy
 from rclpy.event_handler import SubscriptionEventCallbacks
 from std_msgs.msg import String
-from formation_gnc.transport.identified import IdentifiedSubscription, unsubscribe
-from formation_gnc.transport.node import Executor
+from formation_gnc.transport.identified import IdentifiedSubscription, inbox_of
+from formation_gnc.transport.loop import Loop
 from formation_gnc.transport.qos import quality
 
 rclpy.init()
@@ -27,26 +27,21 @@ def flood():
         time.sleep(0.0005)
 
 threading.Thread(target=flood, daemon=True).start()
-executor = Executor()
-executor.add_node(listener)
-received, current, replaced = [], [], []
+loop = Loop(listener)
+received, current, looks = [], [], []
 
 def look():
-    while replaced:
-        replaced.pop().destroy()
     if current:
-        current[-1].silence()
-        replaced.append(current.pop())
+        current.pop().destroy()
     events = SubscriptionEventCallbacks()
     current.append(IdentifiedSubscription(listener, String, "/x", lambda *m: received.append(m), quality(500), events))
     looks.append(len(received))
 
-looks = []
 listener.create_timer(0.02, look)
 while len(looks) < 100:
-    executor.spin_once(timeout_sec=0.1)
-unsubscribe(listener, executor)
-executor.remove_node(listener)
+    loop.spin(0.1)
+loop.remove(listener)
+inbox_of(listener).clear()
 assert len(received) > 100, len(received)
 print("stood", flush=True)
 os._exit(0)
