@@ -58,6 +58,7 @@ class Reception[T]:
         now = monotonic()
         verdict = self.lock.judge(publisher, now)
         if verdict is Verdict.COUNTS:
+            self._release()  # the one before may have left just now
             self._count(data, about)
         elif verdict is Verdict.HELD:
             self._held.append((data, about))
@@ -68,16 +69,18 @@ class Reception[T]:
 
     def look(self) -> list[str]:
         """Let the publisher of what is held succeed, if it may; returns what is new to say, in words."""
-        if self._held and self.lock.candidate is None:
-            self._held.clear()
         if self._held and self.lock.succeeds(monotonic()):
-            held = list(self._held)
-            self._held.clear()
-            for data, about in held:
-                if about["publisher"] == self.lock.chosen:
-                    self._count(data, about)
+            self._release()
         new, self._new = self._new, []
         return new
+
+    def _release(self) -> None:
+        """Let what was held of the publisher that counts now count, and drop that of others."""
+        held = list(self._held)
+        self._held.clear()
+        for data, about in held:
+            if about["publisher"] == self.lock.chosen:
+                self._count(data, about)
 
     def _count(self, data: bytes, about: Information) -> None:
         publisher = about["publisher"]

@@ -71,6 +71,21 @@ def test_who_publishes_only_what_does_not_fit_is_not_kept_to(reception: Receptio
     assert taken == ["one", "two"]
 
 
+def test_what_was_held_counts_when_the_one_before_leaves_the_graph(
+    reception: Reception[str], taken: list[str], clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reception.receive(b"one", about(b"own"))
+    clock.now = 1.0
+    for data in (b"two", b"three"):
+        reception.receive(data, about(b"again"))
+    assert taken == ["one"]
+    clock.now += SUCCESSION / 2  # sooner than its silence would say so
+    monkeypatch.delitem(NAMES, b"own")
+    reception.receive(b"four", about(b"again"))
+    assert reception.look() == []
+    assert taken == ["one", "two", "three", "four"]
+
+
 def test_messages_of_a_node_started_again_are_held_not_lost(
     reception: Reception[str], taken: list[str], clock: Clock
 ) -> None:
