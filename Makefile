@@ -6,7 +6,7 @@ unexport PYTHONDONTWRITEBYTECODE  # or each process of a flight compiles the pac
 
 in_environment := source ./env.sh &&
 # An installed ROS puts pytest plug-ins of its own in the way.
-pytest := python -m pytest --disable-plugin-autoload -p randomly -p timeout -p hypothesispytest --timeout 300
+pytest := python -m pytest --disable-plugin-autoload -p randomly -p timeout -p hypothesispytest --timeout 300 --durations 25
 shared := -p xdist -n auto --dist worksteal
 
 .PHONY: help setup demo test test-fast check bench verify fuzz wheel docs lock clean force

@@ -75,6 +75,13 @@ def test_own_scenario_runs(desk: Path) -> None:
 
 
 @pytest.mark.thorough
+def test_a_formation_of_your_mission_runs(desk: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    save("a_formation_of_your_mission", desk)
+    assert [main(each) for each in commands("a_formation_of_your_mission")] == [0] * 5
+    assert capsys.readouterr().out.count("can be flown") == 2
+
+
+@pytest.mark.thorough
 def test_a_fault_runs(desk: Path, capsys: pytest.CaptureFixture[str]) -> None:
     save("a_fault", desk)
     fault = 'faults:\n      - "{at: 6000.0,'

@@ -5,6 +5,7 @@ Exit status 0 also with warnings; 2 when the scenario cannot be flown.
 
 import argparse
 import json
+from collections.abc import Sized
 from typing import Any
 
 from rich.console import Console
@@ -73,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
     for kind, lines in (("warning", warnings), ("note", notes)):
         for line in lines:
             console.print(f"{kind}: {line}", soft_wrap=True)
-    console.print(f"{scenario.name}: can be flown; {len(warnings)} warnings, {len(notes)} notes")
+    console.print(f"{scenario.name}: can be flown; {_counted(warnings, 'warning')}, {_counted(notes, 'note')}")
     return 0
 
 
@@ -88,3 +89,7 @@ def _is_of_interest(node: str, name: str, source: str, values: dict[str, Any]) -
 def _in_force(values: dict[str, Any]) -> set[str]:
     """The law and the formation of a node."""
     return {str(values[name]["value"]) for name in ("algorithm", "formation") if name in values}
+
+
+def _counted(found: Sized, name: str) -> str:
+    return f"{len(found)} {name if len(found) == 1 else name + 's'}"
