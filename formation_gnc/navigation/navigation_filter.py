@@ -92,20 +92,17 @@ class NavigationFilter(FlightModule[NavigationParameters, Design]):
             state.filter = FILTERS[parameters.filter](state.filter.state, state.filter.covariance)
         if parameters.latest_ticks != old.parameters.latest_ticks:
             state.history = StateHistory(parameters.latest_ticks, state.history)
-        if new.design.variance != old.design.variance:
+        has_other_sensors = new.design.variance != old.design.variance
+        if has_other_sensors:
             state.noise = AdaptiveNoise()
-        if new.design.variance != old.design.variance or (
-            parameters.observability_window != old.parameters.observability_window
-        ):
+        if has_other_sensors or parameters.observability_window != old.parameters.observability_window:
             self._begin_observability(state)
 
     @property
     def _design(self) -> Design:
         """The design, without the sensors that are isolated."""
         design = self.configuration.design
-        if not self._isolated:
-            return design
-        return replace(design, variance=self._left(self._isolated))
+        return replace(design, variance=self._left(self._isolated)) if self._isolated else design
 
     def _left(self, isolated: Sequence[str]) -> dict[str, tuple[float, ...]]:
         """Variances of the sensors in use besides the isolated ones."""
