@@ -29,6 +29,9 @@ PAGE = "neokleous"
 Array = NDArray[np.float64]
 
 SCENARIO = Path(__file__).with_name("neokleous.yaml")
+POINTS = 2000
+"""Of a curve in a picture."""
+
 BOUNDARY = 0.1
 """m; within it after 100 minutes (6.2)."""
 
@@ -289,10 +292,10 @@ def weigh(case: Case, flight: Flight, ours: Ours) -> tuple[list[str], list[Figur
 
 
 def draw_states(flights: dict[Case, Flight], path: Path) -> None:
-    """Rates, x, y, z, radius and r1 - r2, over the first 200 minutes, as Figs. 4.3, 4.4, 5.10 and 5.11."""
+    """Rates, x, y, z, radius and r1 - r2, as Figs. 4.3 and 4.4 (200 minutes), 5.10 and 5.11 (two days)."""
     plot, panels = plt.subplots(len(flights), 6, figsize=(24, 8))
     for row, (case, flight) in zip(panels, flights.items(), strict=True):
-        part = slice(0, 2000)
+        part = slice(None, None, max(1, len(flight.minutes) // POINTS))
         minutes = flight.minutes[part]
         row[0].plot(minutes, MINUTE * flight.rates[part, 0], "k--", label="ideal")
         row[0].plot(minutes, MINUTE * flight.rates[part, 1], label="satellite")
