@@ -39,7 +39,7 @@ def test_cache_lies_where_numba_is_told(roots):
     assert Path(directory("orbit")).parent == roots / "configured"
 
 
-def test_cache_of_a_read_only_package_is_the_users(roots, monkeypatch):
+def reject_all_but_the_users(roots, monkeypatch):
     """Root can write anywhere, so the rejection is simulated."""
     write = tempfile.TemporaryFile
 
@@ -49,6 +49,10 @@ def test_cache_of_a_read_only_package_is_the_users(roots, monkeypatch):
         raise PermissionError(dir)
 
     monkeypatch.setattr(jit.tempfile, "TemporaryFile", reject)
+
+
+def test_cache_of_a_read_only_package_is_the_users(roots, monkeypatch):
+    reject_all_but_the_users(roots, monkeypatch)
     assert Path(directory("orbit")).parent == roots / "user" / "formation_gnc"
 
 
@@ -57,14 +61,7 @@ def test_what_was_compiled_at_the_installation_serves_every_user(roots, monkeypa
     installed = Path(directory("orbit"))
     (installed / "orbit_1").mkdir()
     (installed / "orbit_1" / "twice.nbi").write_bytes(b"index")
-    write = tempfile.TemporaryFile
-
-    def reject(dir):
-        if Path(dir).is_relative_to(roots / "user"):
-            return write(dir=dir)
-        raise PermissionError(dir)
-
-    monkeypatch.setattr(jit.tempfile, "TemporaryFile", reject)
+    reject_all_but_the_users(roots, monkeypatch)
     for _ in range(2):
         own = Path(directory("orbit"))
         assert own.parent == roots / "user" / "formation_gnc"
