@@ -89,9 +89,8 @@ def nodes(context: LaunchContext) -> list[Node]:
 
     plant = {"wait_for_recorder": given["record"], "seed": given["seed"]}
     plant["duration"] = str(float(given["duration"])) if given["duration"] else ""
-    law = {
-        "controller:algorithm": given["controller"]
-    }  # by its name, since a satellite is several nodes in one process
+    # By the node's name, since a satellite is several nodes in one process.
+    law = {"controller:algorithm": given["controller"]}
     again = {"respawn": is_on["use_respawn"], "respawn_delay": 1.0}
     # The flight's own nodes end with it, and nothing else of a launch description that includes this one.
     over = EmitEvent(event=ShutdownProcess(process_matcher=lambda process: process in started))

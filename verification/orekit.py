@@ -50,12 +50,12 @@ def fly(state: Array, duration: float, forces: Forces) -> Array:
     propagator = NumericalPropagator(DormandPrince853Integrator(LEAST_STEP, LONGEST_STEP, ABSOLUTE, RELATIVE))
     propagator.setInitialState(SpacecraftState(orbit))
     if forces.zonal_degree >= 2:
-        propagator.addForceModel(_zonals(forces.zonal_degree, frame))
+        propagator.addForceModel(_zonals(forces.zonal_degree, frame, date))
     end = propagator.propagate(date.shiftedBy(float(duration))).getPVCoordinates()
     return _state(end)
 
 
-def _zonals(degree: int, frame: Any) -> Any:
+def _zonals(degree: int, frame: Any, date: Any) -> Any:
     """Attraction of zonal harmonics about the frame's z axis, read from a file of coefficients."""
     from java.io import File
     from org.orekit.data import DataContext, DirectoryCrawler
@@ -83,15 +83,9 @@ def _zonals(degree: int, frame: Any) -> Any:
         data.addProvider(DirectoryCrawler(File(directory)))
         GravityFieldFactory.clearPotentialCoefficientsReaders()
         GravityFieldFactory.addPotentialCoefficientsReader(ICGEMFormatReader(_POTENTIAL, True))
-        provider = GravityFieldFactory.getConstantNormalizedProvider(degree, 0, _any_date())
+        provider = GravityFieldFactory.getConstantNormalizedProvider(degree, 0, date)
         data.clearProviders()
     return HolmesFeatherstoneAttractionModel(frame, provider)
-
-
-def _any_date() -> Any:
-    from org.orekit.time import AbsoluteDate
-
-    return AbsoluteDate.ARBITRARY_EPOCH
 
 
 @JImplements("org.orekit.time.UTCTAIOffsetsLoader")
@@ -119,16 +113,23 @@ class _Earth:
         return JProxy("org.orekit.bodies.CelestialBody", dict={"getName": lambda: name, "getGM": lambda: MU})
 
 
-def read_oem(path: Path) -> list[tuple[str, Array, Array]]:
-    """Object, times (N,) in s since its first state, and states (N, 6) in m and m/s of each segment of an OEM."""
+def _add_loaders() -> None:
     from org.orekit.bodies import CelestialBodyFactory
-    from org.orekit.data import DataSource
-    from org.orekit.files.ccsds.ndm import ParserBuilder
     from org.orekit.time import TimeScalesFactory
 
     TimeScalesFactory.addUTCTAIOffsetsLoader(_LeapSeconds())
     for body in (CelestialBodyFactory.EARTH, CelestialBodyFactory.SOLAR_SYSTEM_BARYCENTER):
         CelestialBodyFactory.addCelestialBodyLoader(body, _Earth())
+
+
+_add_loaders()
+
+
+def read_oem(path: Path) -> list[tuple[str, Array, Array]]:
+    """Object, times (N,) in s since its first state, and states (N, 6) in m and m/s of each segment of an OEM."""
+    from org.orekit.data import DataSource
+    from org.orekit.files.ccsds.ndm import ParserBuilder
+
     message = ParserBuilder().withMu(MU).buildOemParser().parseMessage(DataSource(str(path)))
     segments = []
     for segment in message.getSegments():

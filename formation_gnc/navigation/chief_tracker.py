@@ -41,7 +41,7 @@ class ChiefTracker:
     @classmethod
     def propagated(cls, state: Vector, seconds: float) -> Self:
         """One without an ephemeris that is trusted, from an earlier state (6,)."""
-        tracker = cls(motion.coast(state, _NO_ACCELERATION, seconds, substeps(seconds)) if seconds > 0.0 else state)
+        tracker = cls(_coasted(state, seconds))
         tracker.is_isolated = True
         return tracker
 
@@ -83,9 +83,7 @@ class ChiefTracker:
 
     def _since(self, time: float, state: Vector) -> Vector:
         """A state (6,) at an earlier time (s), propagated to now."""
-        age = self._elapsed - time
-        propagated: Vector = motion.coast(state, _NO_ACCELERATION, age, substeps(age)) if age > 0.0 else state
-        return propagated
+        return _coasted(state, self._elapsed - time)
 
     def resume(self, step: StepConstants) -> bool:
         """Return to an ephemeris that jumped, once it has moved on along an orbit from its last value.
@@ -102,6 +100,12 @@ class ChiefTracker:
             self.state, self.is_lost = ephemeris, False
             return True
         return False
+
+
+def _coasted(state: Vector, seconds: float) -> Vector:
+    """A state (6,) after a time (s) without thrust; itself after none."""
+    coasted: Vector = motion.coast(state, _NO_ACCELERATION, seconds, substeps(seconds)) if seconds > 0.0 else state
+    return coasted
 
 
 def _agrees(chief: Vector, ephemeris: Vector, step: StepConstants) -> bool:
