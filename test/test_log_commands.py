@@ -2,7 +2,7 @@
 
 import json
 import signal
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import pytest
 
 from formation_gnc.analysis.compare import gnc_topics
 from formation_gnc.cli import main
-from formation_gnc.flight.graph import MODULES
+from formation_gnc.flight.graph import GRAPH, MODULES
 from formation_gnc.flight.topics import QUEUE_DEPTH
 from formation_gnc.messages.conversion import codec
 from formation_gnc.recording import Bag, identical, read
@@ -212,7 +212,7 @@ def rewritten(
     directory: Path,
     numbers: dict[tuple[str, int], int],
     metadata: dict[str, dict[str, str]],
-    timings: dict[int, bytes] | None = None,
+    timings: Iterable[Timing] = (),
 ) -> Path:
     """A copy with other numbers of messages by topic and stamp, 0 to leave one out, and with more."""
     with BagWriter(directory, bag.metadata | metadata) as writer:
@@ -225,8 +225,8 @@ def rewritten(
                 writer.write(topic, data, stamp, number)
         if timings:
             writer.add_topic("/deputy1/timing", "formation_gnc_msgs/msg/Timing", QUEUE_DEPTH)
-        for stamp, timing in (timings or {}).items():
-            writer.write("/deputy1/timing", timing, stamp, 2)
+        for timing in timings:
+            writer.write("/deputy1/timing", codec(Timing).encode(timing), timing.time, 2)
     return directory
 
 
@@ -248,14 +248,36 @@ def test_outputs_of_a_killed_node_are_not_expected(
 ) -> None:
     status, end = "/deputy1/status", 50 * NANOSECONDS
     ticks = Bag(reference).arrays(status)["stamp_ns"].tolist()
-    timings = {stamp: codec(Timing).encode(Timing(stamp, "controller", 100_000)) for stamp in ticks}
+    timings = {stamp: Timing(stamp, "controller", 100_000) for stamp in ticks}
     lost = {(status, end): 0}
-    whole = rewritten(Bag(reference), tmp_path / "whole", lost, {}, timings)
+    whole = rewritten(Bag(reference), tmp_path / "whole", lost, {}, timings.values())
     assert replayed(whole, tmp_path / "whole again", "--nodes", "controller")[0] == 1
     assert f"differs: {status} at 50.000000000 s: only in the second bag" in capsys.readouterr().out
     del timings[end]
-    killed = rewritten(Bag(reference), tmp_path / "killed", lost, {}, timings)
+    killed = rewritten(Bag(reference), tmp_path / "killed", lost, {}, timings.values())
     assert replayed(killed, tmp_path / "killed again", "--nodes", "controller")[0] == 0
+
+
+@pytest.mark.thorough
+def test_what_a_killed_node_told_others_but_not_the_recorder_is_flown(
+    reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A mode that has reached navigation and the rest, whose answers say that they had it, and not the bag."""
+    end, bag = 50 * NANOSECONDS, Bag(reference)
+    inputs = {row.name: (len(row.takes), len(row.takes_of_before)) for row in GRAPH}
+    timings = [
+        Timing(stamp, name, 100_000, [] if stamp else list(range(needed, needed + delayed)))
+        for stamp in bag.arrays("/deputy1/status")["stamp_ns"].tolist()
+        for name, (needed, delayed) in inputs.items()
+        if (stamp, name) != (end, "supervisor")
+    ]
+    lost = {("/deputy1/mode", end): 0, ("/deputy1/health", end): 0}
+    killed = rewritten(bag, tmp_path / "killed", lost, {}, timings)
+    status, again = replayed(killed, tmp_path / "again")
+    printed = capsys.readouterr().out
+    assert status == 0, printed
+    assert "as recorded, not flown" not in printed
+    assert end not in again.arrays("/deputy1/mode")["stamp_ns"], "what was not recorded is not added"
 
 
 @pytest.mark.thorough

@@ -47,6 +47,8 @@ class ReplayedModule:
         self.answer, self.timing = self.row.answer.of(self.deputy), topics.TIMING.of(self.deputy)
         self.orphans = 0
         """Ticks whose input the bag lacks though it was answered."""
+        self.unheard: tuple[int, Sequence[Any], Sequence[Event]] | None = None
+        """Stamp, inputs and swaps of the last tick of which the bag has no answer, though it could have given one."""
         self._was_given_input = True
         self.start(load(self.row.parameters, values))
 
@@ -80,6 +82,15 @@ class ReplayedModule:
             else:
                 module.commit(module.stage(_values(swap, changes)))
         return self.instance.respond(inputs)
+
+    def answer_unheard(self, stamp: int) -> dict[str, Any]:
+        """Outputs by topic at a tick of which the bag has none: a killed process may have reached others with them."""
+        if self.unheard is None or self.unheard[0] != stamp:
+            return {}
+        unheard, self.unheard = self.unheard, None
+        outputs = dict(self.respond(*unheard))
+        self.instance.take_events()
+        return outputs
 
 
 def _values(swap: Event, changes: Mapping[str, str]) -> dict[str, Any]:
@@ -191,7 +202,7 @@ class _Replay:
     def __init__(self, bag: Bag, modules: Sequence[ReplayedModule], decode: Decode, sink: Sink, copy: Copy) -> None:
         self._bag, self._modules, self._decode, self._sink, self._copy = bag, modules, decode, sink, copy
         self._nodes = {module.node for module in modules}
-        self._outputs = {topic for module in modules for topic in module.instance.outputs}
+        self._outputs = {topic: module for module in modules for topic in module.instance.outputs}
         self._before: tuple[_RecordedTick, dict[str, Any]] = (_RecordedTick(-1), {})
         """The tick before, and what was replayed of it, by topic."""
         self._timings = {name for name, topic in bag.topics.items() if topic.count and _is_timing(name)}
@@ -245,10 +256,14 @@ class _Replay:
         if inputs is None and recorded is not None:
             self._take_recorded(tick, module, records)
             return
-        if not is_given or inputs is None:
+        swaps = tick.swaps.get(module.node, ())
+        if inputs is None:
+            return
+        if not is_given:
+            module.unheard = tick.stamp, inputs, swaps
             return
         started = perf_counter()
-        outputs = module.respond(tick.stamp, inputs, tick.swaps.get(module.node, ()))
+        outputs = module.respond(tick.stamp, inputs, swaps)
         events = module.instance.take_events()
         for topic, record in outputs:
             if has_finished or topic in tick.messages:
@@ -260,13 +275,20 @@ class _Replay:
         for event in events:
             self._sink(topics.EVENTS.name, event)
 
-    def _inputs(self, tick: _RecordedTick, module: ReplayedModule, records: Mapping[str, Any]) -> Sequence[Any] | None:
+    def _inputs(self, tick: _RecordedTick, module: ReplayedModule, records: dict[str, Any]) -> Sequence[Any] | None:
         """A module's inputs: as replayed where they are outputs of the replay, else as recorded."""
         instance, (earlier, replayed) = module.instance, self._before
         follows = earlier.stamp == tick.stamp - instance.module.parameters.tick_ns
+        without = tick.timed.get(module.node)
+        if without is not None:
+            for place, topic in enumerate(instance.inputs):
+                is_delayed = topic in instance.delayed
+                there = replayed if is_delayed else records
+                if place not in without and topic in self._outputs and topic not in there:
+                    there |= self._outputs[topic].answer_unheard((earlier if is_delayed else tick).stamp)
         before = self._those(instance.delayed, earlier, replayed) if follows else {}
         now = self._those(instance.inputs.keys() - instance.delayed, tick, records)
-        return instance.collect(now, before, tick.timed.get(module.node))
+        return instance.collect(now, before, without)
 
     def _those(self, names: Collection[str], tick: _RecordedTick, replayed: Mapping[str, Any]) -> dict[str, Any]:
         """The records of topics at a tick, of those that have one."""
