@@ -6,11 +6,10 @@ from math import ceil, tau
 import numpy as np
 
 from formation_gnc.errors import ImpactError
-from formation_gnc.guidance.slots import design_path
-from formation_gnc.orbit.elements import state_from_elements
 from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
 from formation_gnc.orbit.propagation import Propagator
 from formation_gnc.sil.scenario import Scenario
+from formation_gnc.sil.target_path import target_path
 from formation_gnc.types import Vector
 
 POINTS = 60
@@ -36,25 +35,21 @@ def path_demand(scenario: Scenario, deputy: str) -> PathDemand:
     The path is as guidance has it from the chief's true state, anchored anew at every tick; free motion is that of
     the plant's forces.
     """
-    plant, body = scenario.plant, scenario.plant.deputy[deputy]
-    path = design_path(scenario.deputies[deputy]["guidance"])
+    plant = scenario.plant
     revolution = tau / plant.mean_motion
-    step, span = revolution / POINTS, revolution * SPAN
-    bodies = [plant.chief_body, body]
+    span = revolution * SPAN
+    bodies = [plant.chief_body, plant.deputy[deputy]]
     truth = Propagator(span, ceil(span / plant.step), plant.forces, bodies, plant.epoch)
-    rest = step - span
-    onward = Propagator(rest, ceil(rest / plant.step), plant.forces, bodies, plant.epoch)
-    chief, free = state_from_elements(plant.chief_elements), np.zeros((2, 3))
     demands = []
-    for time in (step * np.arange(POINTS)).tolist():
-        aim = path.anchored(chief, time).states(np.array([time]))[0]
+    for time, chief, path in target_path(scenario, deputy, POINTS):
+        aim = path.states(np.array([time]))[0]
+        start = np.array([chief, inertial_from_relative(chief, aim)])
         try:
-            now = truth.propagate(time, np.array([chief, inertial_from_relative(chief, aim)]), free)
-            later = path.anchored(now[0], time + span).states(np.array([time + span]))[0]
-            demands.append((later - relative_from_inertial(now[0], now[1]))[3:] / span)
-            chief = onward.propagate(time + span, now, free)[0]
+            now = truth.propagate(time, start, np.zeros((2, 3)))
         except ImpactError:
             break
+        later = path.anchored(now[0], time + span).states(np.array([time + span]))[0]
+        demands.append((later - relative_from_inertial(now[0], now[1]))[3:] / span)
     taken = np.abs(demands) if demands else np.zeros((1, 3))
     return PathDemand(taken.max(axis=0), float(taken.mean(axis=0).sum()) * revolution)
 
