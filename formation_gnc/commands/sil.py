@@ -113,6 +113,11 @@ def fly(scenario: Scenario, options: argparse.Namespace) -> int:
     bag = options.bag or _free_directory(scenario.name)
     if bag.exists():
         raise ConfigurationError(f"bag {bag}: exists already; name a directory that does not")
+    if not options.in_process:
+        need_ros("--in-process flies without")
+        from formation_gnc.transport.fork_server import fork_server
+
+        fork_server()  # imports while this process looks at the scenario
     console = Console(stderr=True, highlight=False)
     for warning in warnings(scenario):
         console.print(f"warning: {warning}", soft_wrap=True)
@@ -202,8 +207,6 @@ class _Display:
 
 def _fly_on_graph(scenario: Scenario, bag: Path, console: Console, how: dict[str, Any]) -> float:
     from formation_gnc.sil.report import Report
-
-    need_ros("--in-process flies without")
     from formation_gnc.transport.launcher import LaunchOptions, fly_graph
 
     Run(scenario)  # what cannot be flown is rejected before anything starts

@@ -1,17 +1,16 @@
-"""Processes of a run's node graph: started as `ros2 run` would, watched, and stopped, all of them."""
+"""Processes of a run's node graph: started, watched, and stopped, all of them."""
 
-import ctypes
 import os
 import signal
-import subprocess
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic, sleep
 
 from formation_gnc.errors import ConfigurationError
+from formation_gnc.transport.fork_server import ForkedProcess, fork_server
 
-PR_SET_PDEATHSIG = 1  # from <linux/prctl.h>
 GRACE = 2.0
 """Wall time (s) that nodes have to stop when asked; those left then are killed."""
 
@@ -32,7 +31,7 @@ class NodeProcess:
     """A running node."""
 
     name: str
-    process: subprocess.Popen[bytes]
+    process: ForkedProcess
     log: Path
     arguments: list[str]
     respawns: int = 0
@@ -45,7 +44,7 @@ class NodeProcess:
 
     def reason(self) -> str:
         """Why it ended, in words, with the last line of its log."""
-        code = self.process.returncode
+        code = self.process.returncode or 0
         how = f"killed by {signal.Signals(-code).name}" if code < 0 else f"exit status {code}"
         lines = self.log.read_text(errors="replace").strip().splitlines()
         return how + (f": {lines[-1]}" if lines else "")
@@ -66,10 +65,7 @@ class Graph:
     def __init__(self, domain: int, directory: Path) -> None:
         """Start nothing yet; logs go to `directory`."""
         self.nodes: list[NodeProcess] = []
-        self._environment = os.environ | {
-            "ROS_DOMAIN_ID": str(domain),
-            "ROS_AUTOMATIC_DISCOVERY_RANGE": os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"),
-        }
+        self._domain = domain
         self._directory = directory
 
     def start(self, name: str, arguments: list[str], respawns: int = 0) -> NodeProcess:
@@ -80,19 +76,17 @@ class Graph:
         namespace, _, kind = name.rpartition("/")
         remap = ["-r", f"__ns:={namespace}"] if namespace else []
         log = self._directory / f"{name.strip('/').replace('/', '.')}.log"
-        with log.open("ab") as stream:
-            process = subprocess.Popen(
-                [executable(kind), "--ros-args", *remap, "--enclave", name, *arguments],
-                stdin=subprocess.DEVNULL,
-                stdout=stream,
-                stderr=subprocess.STDOUT,
-                env=self._environment,
-                start_new_session=True,
-                preexec_fn=_end_with_parent,  # before any thread is there that could hold a lock
-            )
+        process = fork_server().start(
+            executable(kind), ["--ros-args", *remap, "--enclave", name, *arguments], self._environment(), log
+        )
         node = NodeProcess(name, process, log, arguments, respawns)
         self.nodes.append(node)
         return node
+
+    def _environment(self) -> dict[str, str]:
+        """Variables of a node: those of this process as they are now, which the enclaves of a flight change."""
+        reach = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+        return reach | os.environ | {"ROS_DOMAIN_ID": str(self._domain)}
 
     def check(self) -> None:
         """Raise NodeDied if a node has ended with an error, and is not to be started again."""
@@ -118,15 +112,11 @@ class Graph:
         _wait(self.nodes, GRACE)
 
 
-def _end_with_parent() -> None:
-    """Let the kernel send SIGTERM to this process when the one that started it is gone, however it went."""
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
-
-
 def _signal(nodes: list[NodeProcess], number: signal.Signals) -> None:
     for node in nodes:
         if node.process.poll() is None:
-            os.killpg(node.process.pid, number)
+            with suppress(ProcessLookupError):  # it has just ended
+                os.killpg(node.process.pid, number)
 
 
 def _wait(nodes: list[NodeProcess], seconds: float) -> None:

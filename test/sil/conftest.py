@@ -19,6 +19,7 @@ from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight.graph import MODULES
 from formation_gnc.recording import Bag
 from formation_gnc.sil.scenario import find_scenario
+from formation_gnc.transport.fork_server import ForkedProcess, fork_server
 from formation_gnc.transport.parameter_client import set_parameters
 from formation_gnc.transport.processes import executable
 
@@ -61,15 +62,26 @@ def set_parameter(domain: int, node: str, name: str, value: Any) -> tuple[bool, 
 
 
 class Terminal:
-    """A node started by hand, with what it printed."""
+    """A node started by itself, with what it printed.
 
-    def __init__(self, kind: str, arguments: list[str], environment: dict[str, str], directory: Path) -> None:
+    by_hand: with its executable, as `ros2 run` starts it, which takes seconds of processor time; by default as
+    `formation-gnc sil` starts it.
+    """
+
+    def __init__(
+        self, kind: str, arguments: list[str], environment: dict[str, str], directory: Path, by_hand: bool = False
+    ) -> None:
+        self.log = directory / f"{kind}-{time.monotonic_ns()}.log"
+        arguments = ["--ros-args", *arguments]
+        self.process: subprocess.Popen[bytes] | ForkedProcess
+        if not by_hand:
+            self.process = fork_server().start(executable(kind), arguments, environment, self.log)
+            return
         ros2 = shutil.which("ros2")
         command = [ros2, "run", "formation_gnc", kind] if ros2 else [str(executable(kind))]
-        self.log = directory / f"{kind}-{time.monotonic_ns()}.log"
         with self.log.open("wb") as stream:
             self.process = subprocess.Popen(
-                [*command, "--ros-args", *arguments],
+                [*command, *arguments],
                 stdin=subprocess.DEVNULL,
                 stdout=stream,
                 stderr=subprocess.STDOUT,
@@ -85,7 +97,9 @@ class Terminal:
         os.killpg(self.process.pid, number)
 
     def wait(self, patience: float = PATIENCE) -> int:
-        return self.process.wait(patience)
+        wait_until(lambda: self.process.poll() is not None, f"the end of {self.log.stem}", patience)
+        assert self.process.returncode is not None
+        return self.process.returncode
 
 
 class Desk:
@@ -98,13 +112,13 @@ class Desk:
         self.parameters = find_scenario("leader_follower")
         self.terminals: list[Terminal] = []
 
-    def start(self, kind: str, **parameters: object) -> Terminal:
+    def start(self, kind: str, by_hand: bool = False, **parameters: object) -> Terminal:
         arguments = ["--params-file", str(self.parameters)]
         if kind == "plant":
             parameters = {"deadline": DEADLINE, **parameters}
         for name, value in parameters.items():
             arguments += ["-p", f"{name}:={str(value).lower() if isinstance(value, bool) else value}"]
-        terminal = Terminal(kind, arguments, self.environment, self.directory)
+        terminal = Terminal(kind, arguments, self.environment, self.directory, by_hand)
         self.terminals.append(terminal)
         return terminal
 
@@ -179,19 +193,16 @@ class Sil:
 
     def children(self) -> dict[str, int]:
         """Process numbers of the nodes by executable name."""
-        listed = subprocess.run(
-            ["ps", "-ww", "--ppid", str(self.process.pid), "-o", "pid=,args="],
-            capture_output=True,
-            text=True,
-            check=False,
-        ).stdout
-        found = {}
-        for line in listed.splitlines():
-            pid, *words = line.split()
-            for word in words:
-                if "/lib/formation_gnc/" in word:
-                    found[Path(word).name] = int(pid)
-        return found
+        listed = subprocess.run(["ps", "-wweo", "pid=,ppid=,args="], capture_output=True, text=True, check=False).stdout
+        processes = [line.split() for line in listed.splitlines()]
+        servers = {pid for pid, parent, *_ in processes if parent == str(self.process.pid)}
+        return {
+            Path(word).name: int(pid)
+            for pid, parent, *words in processes
+            if parent in servers
+            for word in words
+            if "/lib/formation_gnc/" in word
+        }
 
     def is_recorded(self) -> bool:
         """Whether messages of the flight are on disk."""

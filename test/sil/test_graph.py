@@ -45,7 +45,7 @@ def test_nodes_started_by_hand_in_any_order_fly_and_swap_the_law_in_flight(desk:
     }
     kinds = ["plant", "recorder", *PARTS]
     random.shuffle(kinds)
-    terminals = {kind: desk.start(kind, **options.get(kind, {})) for kind in kinds}
+    terminals = {kind: desk.start(kind, by_hand=True, **options.get(kind, {})) for kind in kinds}
     wait_until(lambda: "acquired" in terminals["navigation"].text, f"the first estimate of {kinds}")
     time.sleep(1.0)
     accepted, reason = set_parameter(desk.domain, "/deputy1/controller", "algorithm", "coast")
@@ -281,7 +281,7 @@ def test_the_nodes_end_when_the_command_is_killed(sil: StartSil) -> None:
 def test_a_node_rejects_a_wrong_parameter_in_one_line_with_status_2(
     desk: Desk, kind: str, parameter: dict[str, object], said: str
 ) -> None:
-    terminal = desk.start(kind, **parameter)
+    terminal = desk.start(kind, by_hand=True, **parameter)
     assert terminal.wait() == 2
     # `ros2 run` adds a line of its own
     (line,) = [line for line in terminal.text.splitlines() if line.strip() and not line.startswith("[ros2run]")]
