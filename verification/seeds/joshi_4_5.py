@@ -385,7 +385,8 @@ def finite(directory: Path, ours: Ours) -> tuple[str, list[Figure]]:
         "",
         "Three readings of 5.2: (a) the matrices of t₀ kept all the way; (b) the transition matrix from",
         "t₀ made anew at every second with the matrices of now; (c) the problem solved anew at every",
-        "second for the time to go, from the state of now.",
+        "second for the time to go, from the state of now, which alone is frozen: the chief's motion to come",
+        "is known.",
         "",
     ]
     goals, met, pictures = goals_of(goal, final), [], []
