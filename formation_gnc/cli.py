@@ -1,17 +1,17 @@
 """The `formation-gnc` command."""
 
 import argparse
+import ast
 import io
 import os
 import signal
 import sys
-import tempfile
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import NoReturn
 
-from formation_gnc import __version__
+from formation_gnc import __version__, commands
 from formation_gnc.commands import COMMANDS
 from formation_gnc.errors import ConfigurationError
 
@@ -33,6 +33,8 @@ def _prepare_environment() -> None:
     try:
         Path.home()
     except RuntimeError:
+        import tempfile
+
         home = Path(tempfile.gettempdir()) / f"formation_gnc-home-{os.getuid()}"
         home.mkdir(mode=0o700, exist_ok=True)
         os.environ["HOME"] = str(home)
@@ -63,20 +65,28 @@ def _options(arguments: Sequence[str]) -> argparse.Namespace:
         epilog="`formation-gnc COMMAND --help` describes each command.",
     )
     parser.add_argument("--version", action="version", version=f"{NAME} {__version__}")
-    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    # Import only the command that runs: the libraries of plots and reports take long to load.
-    for name in arguments[:1] if set(arguments[:1]) & set(COMMANDS) else COMMANDS:
-        command = import_module(f"formation_gnc.commands.{name}")
-        doc = (command.__doc__ or "").strip()
-        subparser = commands.add_parser(
+    subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    # Only the command that runs is imported: what it flies, plots or reads takes seconds to load.
+    wanted = arguments[0] if arguments and arguments[0] in COMMANDS else None
+    for name in [wanted] if wanted else COMMANDS:
+        doc = _documentation(name)
+        subparser = subparsers.add_parser(
             name,
             help=doc.splitlines()[0].rstrip("."),
             description=doc,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-        command.add_arguments(subparser)
-        subparser.set_defaults(run=command.run)
+        if wanted:
+            command = import_module(f"formation_gnc.commands.{name}")
+            command.add_arguments(subparser)
+            subparser.set_defaults(run=command.run)
     return parser.parse_args(arguments)
+
+
+def _documentation(name: str) -> str:
+    """What the module of a command says of it, without importing it."""
+    source = Path(commands.__file__).with_name(f"{name}.py").read_text(encoding="utf-8")
+    return ast.get_docstring(ast.parse(source)) or ""
 
 
 def _run(arguments: Sequence[str]) -> int:

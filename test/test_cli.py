@@ -274,6 +274,13 @@ def test_help_names_every_command(
         assert f"\n    {name} " in printed
 
 
+def test_help_imports_no_library_of_numbers() -> None:
+    """It takes a fifth of a second, and took five."""
+    code = "import sys\ntry:\n from formation_gnc.cli import main; main(['--help'])\nfinally:\n print(*sys.modules)"
+    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert not {"numpy", "scipy", "numba", "rich", "yaml", "rclpy"} & set(shown.splitlines()[-1].split())
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_help_of_a_command_describes_all_its_options(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert call(name, "--help") == 0
