@@ -2,6 +2,7 @@
 
 import ast
 import importlib
+import json
 import os
 import re
 import runpy
@@ -100,7 +101,7 @@ def test_versions_agree():
         assert statement.format(formation_gnc.__version__) in (ROOT / name).read_text(), name
 
 
-IN_DISTRIBUTIONS = {"cryptography", "matplotlib", "numba", "numpy", "rich", "scipy", "yaml"}
+IN_DISTRIBUTIONS = {"cryptography", "matplotlib", "numba", "numpy", "rich", "scipy", "setproctitle", "yaml"}
 """Modules of packages that rosdep installs from a distribution (rosdistro, rosdep/python.yaml)."""
 
 BY_PIP = {"control", "filterpy", "lz4", "mcap", "osqp", "plotly", "pymsis", "rosbags", "skyfield", "zstandard"}
@@ -210,6 +211,28 @@ def test_a_machine_without_is_told_in_one_line_what_to_install(lacking, advice, 
     assert not (tmp_path / ".venv").exists()
 
 
+def test_uv_fetches_the_python_that_a_machine_lacks(tmp_path):
+    """With an uv and a Python that only say what they were asked for; the set-up ends where that makes no .venv."""
+    shutil.copytree(ROOT / "tools", tmp_path / "tools")
+    (tmp_path / ".ros").write_text(f"wheels for {tmp_path}\n")
+    path = without(tmp_path, "python3.12")
+    shutil.copy(shutil.which("rm"), tmp_path / "bin/rm")
+    shutil.copy(shutil.which("cmp"), tmp_path / "bin/cmp")
+    for name, script in {
+        "uv": f'echo "$*" >> {tmp_path}/asked; [ "$2" = install ] || echo {tmp_path}/python',
+        "../python": f'echo "$*" >> {tmp_path}/asked; exit 7',
+    }.items():
+        (tmp_path / "bin" / name).write_text(f"#!/usr/bin/env bash\n{script}\n")
+        (tmp_path / "bin" / name).chmod(0o755)
+    result = run("tools/make_venv.sh", cwd=tmp_path, PATH=path, PYENV_ROOT=str(tmp_path), XDG_DATA_HOME=str(tmp_path))
+    assert result.returncode == 7, result.stderr
+    first, second = result.stdout.splitlines()
+    assert first.endswith("uv fetches one, for this user")
+    assert f"making .venv with {tmp_path}/python" in second
+    asked = (tmp_path / "asked").read_text().splitlines()
+    assert asked[-3:] == ["python install --quiet 3.12", "python find 3.12", "-m venv .venv"]
+
+
 def test_all_that_a_machine_lacks_is_told_at_once(tmp_path):
     shutil.copytree(ROOT / "tools", tmp_path / "tools")
     (tmp_path / ".ros").write_text(f"wheels for {tmp_path}\n")
@@ -221,7 +244,7 @@ def test_all_that_a_machine_lacks_is_told_at_once(tmp_path):
     result = run("tools/make_venv.sh", cwd=tmp_path, **nothing)
     assert result.returncode == 2
     assert result.stderr.count("\n") == 1
-    for advice in ("install g++", "install python3.12", "uv python install 3.12"):
+    for advice in ("install g++", "install python3.12", "by which uv fetches one"):
         assert advice in result.stderr
 
 
@@ -231,6 +254,22 @@ def test_the_lock_pins_every_package_with_its_hashes():
         assert len(entries) > 10
         for entry in entries:
             assert re.match(r"[a-z0-9-]+==\S+ \\\n    --hash=sha256:[0-9a-f]{64}", entry), entry.split("\n")[0]
+
+
+def test_image_devcontainer_and_ci_set_up_as_the_documentation_says():
+    image = (ROOT / "Dockerfile").read_text()
+    packages = "python3.12 python3.12-dev python3.12-venv g++ make git"
+    assert packages in image
+    assert packages in (ROOT / "docs/installation.md").read_text()
+    container = json.loads((ROOT / ".devcontainer/devcontainer.json").read_text())
+    place = ROOT / ".devcontainer" / container["build"]["dockerfile"]
+    assert place.resolve() == ROOT / "Dockerfile"
+    assert f"WORKDIR {container['workspaceFolder']}\n" in image
+    jobs = yaml.safe_load((ROOT / ".github/workflows/ci.yml").read_text())["jobs"]
+    commands = {name: [step.get("run") for step in job["steps"]] for name, job in jobs.items()}
+    assert ".ci/run" in commands["wheels"]
+    assert ".ci/run" in commands["jazzy"]
+    assert jobs["jazzy"]["container"] == "ros:jazzy-ros-base"
 
 
 def test_pre_commit_runs_the_checks_of_make_check():

@@ -37,8 +37,22 @@ find_python() { # of these candidates, into $python; [rclpy, if it must have tha
         venv) missing+=("Python 3.12 lacks venv: install python3.12-venv") ;;
         rclpy) missing+=("the ROS 2 Jazzy in $ros lacks rclpy: install ros-jazzy-rclpy") ;;
         *) missing+=("no Python 3.12: install python3.12, python3.12-dev and python3.12-venv, or where there are none \
-(Debian 13, Ubuntu 22.04) run 'python3 -m venv ~/.uv && ~/.uv/bin/pip install uv && ~/.uv/bin/uv python install 3.12'") ;;
+(Debian 13, Ubuntu 22.04) install python3-venv, by which uv fetches one") ;;
     esac
+}
+
+fetch_python() { # with uv, which comes from PyPI where it is missing; into $python
+    local uv=uv
+    if ! command -v uv > /dev/null; then
+        uv=build/uv/bin/uv
+        python3 -c "import ensurepip, venv" 2> /dev/null || return
+    fi
+    echo "formation_gnc: no Python 3.12 with headers and venv here: uv fetches one, for this user"
+    if [[ $uv != uv ]]; then
+        rm -rf build/uv
+        python3 -m venv build/uv && build/uv/bin/python -m pip install -qq --disable-pip-version-check uv || return
+    fi
+    "$uv" python install --quiet 3.12 && python=$(UV_PYTHON_PREFERENCE=only-managed "$uv" python find 3.12)
 }
 
 compilers="${CC:-cc} ${CXX:-c++}"
@@ -50,7 +64,12 @@ if [[ $ros == wheels ]]; then
     candidates=(python3.12 python3 "${PYENV_ROOT:-${HOME:-}/.pyenv}"/versions/3.12*/bin/python3.12)
     candidates+=("${UV_PYTHON_INSTALL_DIR:-${XDG_DATA_HOME:-${HOME:-}/.local/share}/uv/python}"/cpython-3.12*/bin/python3.12)
     ! command -v uv > /dev/null || candidates+=("$(uv python find 3.12 2> /dev/null || true)")
+    lacked=${#missing[@]}
     find_python
+    # Nothing is fetched where the set-up would end all the same.
+    if ((lacked == 0 && ${#missing[@]} > 0)) && fetch_python; then
+        missing=()
+    fi
     options=()
     left_out='^$'
 else
