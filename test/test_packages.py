@@ -101,10 +101,10 @@ def test_versions_agree():
         assert statement.format(formation_gnc.__version__) in (ROOT / name).read_text(), name
 
 
-IN_DISTRIBUTIONS = {"cryptography", "matplotlib", "numba", "numpy", "rich", "scipy", "setproctitle", "yaml"}
+IN_DISTRIBUTIONS = {"cryptography", "matplotlib", "numba", "numpy", "rich", "scipy", "yaml"}
 """Modules of packages that rosdep installs from a distribution (rosdistro, rosdep/python.yaml)."""
 
-BY_PIP = {"control", "filterpy", "lz4", "mcap", "osqp", "plotly", "pymsis", "rosbags", "skyfield", "zstandard"}
+BY_PIP = {"control", "filterpy", "lz4", "mcap", "osqp", "plotly", "pymsis", "rosbags", "setproctitle", "skyfield", "zstandard"}
 """Those that it does not."""
 
 
