@@ -147,6 +147,16 @@ def test_no_file_is_longer_than_350_lines():
 
 
 @pytest.mark.thorough
+def test_executables_are_read_in_one_look():
+    lines = {
+        name: len(path.read_text(encoding="utf-8").splitlines())
+        for name, path in modules().items()
+        if path.parent.name == "nodes"
+    }
+    assert len(lines) > 5
+    assert max(lines.values()) <= 60, lines
+
+
 def test_no_function_is_longer_than_60_lines():
     assert {name: number for name, number in long_functions().items() if name not in LONG_FUNCTIONS} == {}
 

@@ -16,7 +16,6 @@ import signal
 import socket
 import subprocess
 import sys
-import traceback
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -184,7 +183,7 @@ def _fork(requests: socket.socket, request: dict[str, Any]) -> int:
         requests.close()  # a copy of the server's end, which would keep the launcher's from ending
         _become(server, **request)
     except BaseException:
-        traceback.print_exc()
+        sys.excepthook(*sys.exc_info())  # which executables make a line of, and the exit status, for what is refused
     finally:
         os._exit(1)
 

@@ -14,17 +14,17 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from formation_gnc.flight.graph import MODULES
-from formation_gnc.nodes.display import DisplayNode
-from formation_gnc.nodes.plant import PlantNode
-from formation_gnc.nodes.recorder import RecorderNode
-from formation_gnc.nodes.replay import ReplayNode
 from formation_gnc.recording.in_process_recorder import InProcessRecorder
 from formation_gnc.recording.provenance import provenance
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import find_scenario, load_scenario
+from formation_gnc.transport.display_node import DisplayNode
 from formation_gnc.transport.module_node import ModuleNode
 from formation_gnc.transport.node import ConfiguredNode
+from formation_gnc.transport.plant_node import PlantNode
+from formation_gnc.transport.recorder_node import RecorderNode
+from formation_gnc.transport.replay_node import ReplayNode
 
 PATIENCE = 30.0  # s of wall time, for a machine that is busy with other things
 

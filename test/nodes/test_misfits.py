@@ -11,12 +11,12 @@ from rclpy._rclpy_pybind11 import RCLError
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import MODULES
 from formation_gnc.messages.conversion import from_cdr, to_cdr
-from formation_gnc.nodes.plant import PlantNode
-from formation_gnc.nodes.recorder import RecorderNode
 from formation_gnc.recording import Bag
 from formation_gnc.records import Clock, Event
 from formation_gnc.transport.message_types import message_class
+from formation_gnc.transport.plant_node import PlantNode
 from formation_gnc.transport.qos import quality
+from formation_gnc.transport.recorder_node import RecorderNode
 
 from .conftest import Bench
 

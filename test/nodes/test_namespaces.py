@@ -4,10 +4,10 @@ import pytest
 
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import MODULES
-from formation_gnc.nodes.plant import PlantNode
-from formation_gnc.nodes.recorder import RecorderNode
 from formation_gnc.recording import Bag
 from formation_gnc.transport.node import ConfiguredNode
+from formation_gnc.transport.plant_node import PlantNode
+from formation_gnc.transport.recorder_node import RecorderNode
 
 from .conftest import Bench
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from formation_gnc.nodes.recorder import RecorderNode, free_directory
 from formation_gnc.recording.provenance import provenance
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.transport.presence import Presence
+from formation_gnc.transport.recorder_node import RecorderNode, free_directory
 
 from .conftest import Bench
 

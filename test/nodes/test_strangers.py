@@ -6,8 +6,6 @@ from rclpy.node import Node
 
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import MODULES
-from formation_gnc.nodes.plant import PlantNode
-from formation_gnc.nodes.recorder import RecorderNode
 from formation_gnc.recording import Bag, identical
 from formation_gnc.recording.in_process_recorder import InProcessRecorder
 from formation_gnc.recording.provenance import provenance
@@ -15,7 +13,9 @@ from formation_gnc.recording.writer import BagWriter
 from formation_gnc.sil.runner import Run
 from formation_gnc.sil.scenario import load_scenario
 from formation_gnc.transport.message_types import message_class
+from formation_gnc.transport.plant_node import PlantNode
 from formation_gnc.transport.qos import quality
+from formation_gnc.transport.recorder_node import RecorderNode
 
 from .conftest import Bench
 

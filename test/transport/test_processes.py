@@ -9,7 +9,7 @@ from formation_gnc.transport import processes
 from formation_gnc.transport.processes import Graph
 
 
-def test_nodes_get_the_variables_of_their_start_such_as_those_of_their_enclaves(
+def test_nodes_get_the_variables_of_their_start_as_of_their_enclaves(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     started: list[tuple[Any, ...]] = []
