@@ -75,7 +75,7 @@ class RecordingSession:
             a message at every tick, those of a second publisher are left out (:class:`Reception`).
         """
         self.bag.add_topic(topic, type_name, topics.QUEUE_DEPTH)
-        loss, node = LossCounter(lambda: len(publishers()), latched), _answering(topic)
+        loss, node = LossCounter(latched), _answering(topic)
         self._losses[topic] = loss
         is_ours = type_name in topics.types_of(topic)
         is_clock, is_events = is_ours and topic == topics.CLOCK.name, is_ours and topic == topics.EVENTS.name
@@ -87,7 +87,7 @@ class RecordingSession:
             stamp, number = about["stamp"], about["publication_sequence_number"]
             count += 1
             if number is not None:
-                loss.take(number)
+                loss.take(about["publisher"], number)
             if node and number == 1 and count > 1:
                 self.parameters.restarted(node, stamp)
             if is_events:
