@@ -11,7 +11,12 @@ from formation_gnc.recording.topic_definition import TopicDefinition
 EMPTY_START = 2**63 - 1
 """Starting time (ns) that rosbag2 gives a bag without messages."""
 
-_Dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+
+class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
+    """Writes what several topics share out for each of them, as rosbag2 does."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
 
 
 @dataclass

@@ -50,7 +50,8 @@ class BagContents:
         self.damage = next((file.damage for file in files if file.damage), None)
         self.remarks = [*missing_files(path), *(file.damage for file in files if file.damage)]
         self.series: dict[str, Series] = {}
-        self._places: dict[tuple[int, Series], int] = {}  # row of a series' first message, by number of the file
+        self._places: dict[str, list[tuple[int, Series, int]]] = {}
+        """By topic: number of a file, series in it, and row of its first message."""
         self._counts: dict[str, int] = {}
         for topic, candidates in self._candidates().items():
             self._choose(topic, candidates)
@@ -85,7 +86,7 @@ class BagContents:
             candidates, key=lambda series: (candidates[series] > 0, series.type_name == expected, candidates[series])
         )
         self.series[topic] = best
-        count = 0
+        count, places = 0, list[tuple[int, Series, int]]()
         for series, messages in candidates.items():
             if series != best and not _alike(series, best):
                 if messages:
@@ -95,9 +96,9 @@ class BagContents:
                     )
                 continue
             for number, file in enumerate(self._files):
-                self._places[number, series] = count
+                places.append((number, series, count))
                 count += len(file.stamps(series))
-        self._counts[topic] = count
+        self._counts[topic], self._places[topic] = count, places
 
     def count(self, topic: str) -> int:
         """Number of a topic's messages."""
@@ -105,11 +106,7 @@ class BagContents:
 
     def stamps(self, topic: str) -> NDArray[np.int64]:
         """Stamps (ns) of a topic by row."""
-        parts = [
-            (place, self._files[number].stamps(series))
-            for (number, series), place in self._places.items()
-            if series.topic == topic
-        ]
+        parts = [(place, self._files[number].stamps(series)) for number, series, place in self._places[topic]]
         parts.sort(key=lambda part: (part[0], len(part[1])))
         return np.concatenate([stamps for _, stamps in parts])
 
@@ -128,11 +125,12 @@ class BagContents:
         Raises:
             BagError: the file is damaged.
         """
-        file, places = self._files[number], self._places
+        file = self._files[number]
         rows = {
             series: row
-            for (each, series), row in places.items()
-            if each == number and series.topic in wanted and series in file.definitions
+            for topic in wanted
+            for each, series, row in self._places.get(topic, ())
+            if each == number and series in span.series
         }
         return file.messages(span, rows) if rows else iter(())
 
@@ -163,7 +161,7 @@ class BagContents:
 
     def _is_suspicious(self, topic: str) -> bool:
         """Whether messages of a topic may be doubled, out of order, or of several runs."""
-        if any(self._files[number].repeats(series) for number, series in self._places if series.topic == topic):
+        if any(self._files[number].repeats(series) for number, series, _ in self._places[topic]):
             return True
         steps = np.diff(self.stamps(topic))
         return bool(np.any(steps < 0) or (not is_free(topic) and np.any(steps == 0)))

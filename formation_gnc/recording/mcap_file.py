@@ -102,7 +102,8 @@ class McapFile(StoredFile):
             raise BagError(f"{self.path}: damaged (the checksum of its data section is wrong); recover it first")
         if outside.start <= outside.end:
             ends = [*self.spans, outside]
-            self.spans = [Span(None, min(span.start for span in ends), max(span.end for span in ends))]
+            held = set().union(*(span.series for span in ends))
+            self.spans = [Span(None, min(span.start for span in ends), max(span.end for span in ends), series=held)]
 
     def _add(self, record: FileRecord, span: Span) -> None:
         match record:

@@ -94,6 +94,8 @@ class Span:
     """Last stamp, ns."""
     first: Mapping[Series, int] = field(default_factory=dict)
     """Row of each series' first message."""
+    series: set[Series] = field(default_factory=set)
+    """Those with messages in it."""
 
 
 class _Stamps:
@@ -178,6 +180,7 @@ class StoredFile:
         self.copy: object = None  # kept while the file is read
         self._stamps: dict[Series, _Stamps] = {}
         self._channels: dict[int, Series] = {}
+        self._channels_of: dict[Series, list[int]] = {}
         self._latest: tuple[int, int] | None = None  # stamp and log time of the run's latest message
 
     def messages(self, span: Span, wanted: Mapping[Series, int]) -> Iterator[BagMessage]:
@@ -193,7 +196,7 @@ class StoredFile:
         cursors = {
             series: _Cursor(self._stamps[series], span.first.get(series, 0), wanted[series]) for series in wanted
         }
-        cursor_of = {channel: cursors[series] for channel, series in self._channels.items() if series in wanted}
+        cursor_of = {channel: cursors[series] for series in wanted for channel in self._channels_of[series]}
         for channel, data, sequence in self._span_records(span, cursor_of):
             cursor = cursor_of[channel]
             stamps, row = cursor.stamps, cursor.row
@@ -233,6 +236,7 @@ class StoredFile:
         if channel.id not in self._channels:
             series = Series.of(schema, channel)
             self._channels[channel.id] = series
+            self._channels_of.setdefault(series, []).append(channel.id)
             self.definitions.setdefault(series, (schema, channel))
             self._stamps.setdefault(series, _Stamps(series))
 
@@ -264,6 +268,7 @@ class StoredFile:
         elif self._latest is not None and self._latest[0] != self._latest[1]:
             stamp = self._latest[0]
         stamps.add(stamp, data)
+        span.series.add(series)
         if stamp < span.start:
             span.start = stamp
         if stamp > span.end:

@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Self
+from functools import lru_cache
+from typing import Any, Self
 
 import yaml
 from mcap.records import Channel, Schema
@@ -43,7 +44,7 @@ class TopicDefinition:
         """Definition by an MCAP file's records; QoS profiles that are no YAML are left out."""
         metadata = dict(channel.metadata)
         try:
-            load_limited(metadata.get("offered_qos_profiles", ""))
+            qos_profiles(metadata)
         except yaml.YAMLError:
             del metadata["offered_qos_profiles"]
         name, text, encoding = (schema.name, schema.data, schema.encoding) if schema else ("", b"", "")
@@ -64,3 +65,11 @@ class TopicDefinition:
             raise BagError(f"queue depth {depth} is not allowed; it must be at least 1")
         metadata = {"offered_qos_profiles": _OFFERED_QOS % depth, "topic_type_hash": type_hash(type_name)}
         return cls(type_name, schema_text(type_name).encode(), metadata=metadata)
+
+
+def qos_profiles(metadata: Mapping[str, str]) -> Any:
+    """The QoS profiles of a channel's metadata, not to be changed; raises yaml.YAMLError for what is no YAML."""
+    return _parsed(metadata.get("offered_qos_profiles", "[]"))
+
+
+_parsed = lru_cache(maxsize=64)(load_limited)  # thousands of topics have the same few

@@ -15,9 +15,8 @@ from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
 
 from formation_gnc import __version__
 from formation_gnc.errors import BagError
-from formation_gnc.limited_yaml import load_limited
 from formation_gnc.recording.bag_metadata import FileEntry, TopicEntry, bag_information
-from formation_gnc.recording.topic_definition import TopicDefinition
+from formation_gnc.recording.topic_definition import TopicDefinition, qos_profiles
 
 CHUNK_BYTES = 1 << 20
 FLUSH_INTERVAL = 0.25
@@ -119,7 +118,7 @@ class BagWriter:
         """
         if topic in self._topics:
             raise BagError(f"topic {topic!r}: already in the bag {self.directory}")
-        qos = load_limited(definition.metadata.get("offered_qos_profiles", "[]"))
+        qos = qos_profiles(definition.metadata)
         with self._guarded():
             self._register(topic, definition)
         self._topics[topic] = TopicEntry(definition, qos)
