@@ -19,7 +19,9 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from formation_gnc.common import CommonParameters
+from formation_gnc.guidance.curvilinear import curvilinear_from_hill, hill_from_curvilinear
 from formation_gnc.guidance.guidance import Guidance
+from formation_gnc.orbit.constants import MU
 from formation_gnc.orbit.frames import inertial_from_relative, relative_from_inertial
 from formation_gnc.orbit.propagation import Propagator
 from formation_gnc.relative.hill import HillModel
@@ -142,7 +144,10 @@ def scenario(acquisition: Acquisition, setting: Setting) -> Scenario:
 
 
 class HillTruth(Propagator):
-    """The chief under J2; the others by Hill's equations about it, thrust held along its axes."""
+    """The chief under J2; the others by Hill's equations about it, in the coordinates of targets: curvilinear ones.
+
+    Thrust is held along its axes.
+    """
 
     def __init__(self, common: CommonParameters) -> None:
         """For the common's orbit and tick."""
@@ -152,11 +157,15 @@ class HillTruth(Propagator):
     def propagate_with_thrust(self, time: float, states: Array, forces: Array, masses: Array) -> Array:
         """States one tick later."""
         chief = self.propagate(time, states[:1], np.zeros((1, 3)))[0]
+        now = np.zeros(len(states) - 1)
+        before = np.array([relative_from_inertial(states[0], state) for state in states[1:]])
+        before = curvilinear_from_hill(before, states[0], now, MU)
         moved = [
-            self._model.propagate(0.0, relative_from_inertial(states[0], state), self._tick, force / mass)
-            for state, force, mass in zip(states[1:], forces[1:], masses[1:], strict=True)
+            self._model.propagate(0.0, state, self._tick, force / mass)
+            for state, force, mass in zip(before, forces[1:], masses[1:], strict=True)
         ]
-        return np.array([chief, *(inertial_from_relative(chief, each) for each in moved)])
+        after = hill_from_curvilinear(np.array(moved), chief, now, MU)
+        return np.array([chief, *(inertial_from_relative(chief, each) for each in after)])
 
 
 @dataclass(frozen=True)
