@@ -72,7 +72,7 @@ class Acquisition:
 
 
 ACQUISITIONS = (
-    Acquisition("tetrahedral", "three_in_plane_one_out", 1000.0, 240.0, "RunHistory in 4.4", 0, 2.09),
+    Acquisition("tetrahedral", "three_in_plane_one_out", 1000.0, 240.0, "Flown in 4.4", 0, 2.09),
     Acquisition("equidistant", "helix", 400.0, 80.0, "Set in the listing of the main function", 0, 1.79),
     Acquisition("three_in_plane_one_out", "equidistant", 1000.0, 240.0, "To be tested by 4.2", 1, 1.58),
     Acquisition("equidistant", "tetrahedral", 1000.0, 240.0, "To be tested by 4.2", 0, 1.66),

@@ -62,7 +62,7 @@ def accepted() -> dict[str, float]:
 
 
 def rows() -> list[list[str]]:
-    """FlightModule of the page, name and value of each figure accepted last."""
+    """Part of the page, name and value of each figure accepted last."""
     if not ACCEPTED.exists():
         return []
     with ACCEPTED.open() as stream:
