@@ -3,7 +3,8 @@
 A process that imports NumPy, SciPy, Numba and the compiled kernels takes seconds before its first line of its own;
 six of them on two cores are most of a short flight. So one process does it for all, and each node is a fork of it: a
 process and process group of its own, with its own environment and log, and what `ros2 run` would have started in
-everything else. The server leaves rclpy alone, which starts threads when it is imported: a fork has none of them.
+everything else. The server leaves rclpy alone, which starts threads when it is imported: a fork has none of them, and
+may wait for ever for what they hold. Where a plug-in starts some, nodes are their executables, started as by hand.
 """
 
 import ctypes
@@ -16,6 +17,7 @@ import signal
 import socket
 import subprocess
 import sys
+import warnings
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -132,6 +134,7 @@ def _serve(requests: socket.socket) -> None:
         _import_core()
     gc.collect()
     gc.freeze()  # what is imported stays as it is, and its pages shared
+    warnings.filterwarnings("ignore", category=DeprecationWarning, message=".*fork")  # forks of threads are replaced
     with selectors.DefaultSelector() as selector:
         selector.register(requests, selectors.EVENT_READ)
         while True:
@@ -175,13 +178,13 @@ def _tell(launcher: socket.socket, reply: dict[str, int]) -> None:
 
 
 def _fork(requests: socket.socket, request: dict[str, Any]) -> int:
-    server = os.getpid()
+    server, has_threads = os.getpid(), len(list(Path("/proc/self/task").iterdir())) > 1
     if pid := os.fork():
         os.setpgid(pid, pid)  # by now, since what it is told next may be to stop
         return pid
     try:
         requests.close()  # a copy of the server's end, which would keep the launcher's from ending
-        _become(server, **request)
+        _become(server, has_threads, **request)
     except BaseException:
         sys.excepthook(*sys.exc_info())  # which executables make a line of, and the exit status, for what is refused
     finally:
@@ -189,15 +192,23 @@ def _fork(requests: socket.socket, request: dict[str, Any]) -> int:
 
 
 def _become(
-    server: int, executable: str, arguments: list[str], environment: dict[str, str], directory: str, log: str
+    server: int,
+    has_threads: bool,
+    executable: str,
+    arguments: list[str],
+    environment: dict[str, str],
+    directory: str,
+    log: str,
 ) -> NoReturn:
     """Be the process of a node, which never returns from its main function."""
     end_with_parent()
     if os.getppid() != server:  # it ended before the kernel knew
         os._exit(1)
-    setproctitle(" ".join((sys.executable, executable, *arguments)))  # before it changes what it finds its place by
     _attach(Path(log))
     os.chdir(directory)
+    if has_threads:
+        os.execve(executable, [executable, *arguments], environment)
+    setproctitle(" ".join((sys.executable, executable, *arguments)))  # before it changes what it finds its place by
     os.environ.clear()
     os.environ.update(environment)
     if environment.get("PYTHONFAULTHANDLER"):  # the one of Python's own that a start would heed, and nodes need

@@ -84,6 +84,27 @@ def test_the_server_has_no_thread_that_a_fork_would_lack(server: ForkServer, tmp
     os.killpg(process.pid, signal.SIGKILL)
 
 
+def test_nodes_are_executables_where_a_plug_in_has_threads(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Which a fork would lack, and whose locks it might wait for."""
+    (tmp_path / "threads.py").write_text(
+        "import threading, time\n"
+        "from formation_gnc.control.coast import Coast\n"
+        "threading.Thread(target=time.sleep, args=(600.0,), daemon=True).start()\n"
+        "class Waiting(Coast): pass\n"
+    )
+    (tmp_path / "threads-1.dist-info").mkdir()
+    (tmp_path / "threads-1.dist-info/METADATA").write_text("Metadata-Version: 2.1\nName: threads\nVersion: 1\n")
+    (tmp_path / "threads-1.dist-info/entry_points.txt").write_text("[formation_gnc.laws]\nwaiting = threads:Waiting\n")
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{os.environ['PYTHONPATH']}")
+    server = ForkServer()
+    process = start(server, tmp_path / "log")
+    shown = Path(f"/proc/{process.pid}/cmdline")
+    wait_until(lambda: str(executable("navigation")).encode() in shown.read_bytes().split(b"\0"), "its own arguments")
+    os.killpg(process.pid, signal.SIGKILL)
+    wait_until(lambda: process.poll() is not None, "the end")
+    assert process.returncode == -signal.SIGKILL
+
+
 def test_nodes_of_a_killed_server_end_and_are_told_as_ended(tmp_path: Path) -> None:
     server = ForkServer()
     processes = [start(server, tmp_path / str(number)) for number in range(2)]
