@@ -103,7 +103,19 @@ def test_versions_agree():
 IN_DISTRIBUTIONS = {"cryptography", "matplotlib", "numba", "numpy", "rich", "scipy", "yaml"}
 """Modules of packages that rosdep installs from a distribution (rosdistro, rosdep/python.yaml)."""
 
-BY_PIP = {"control", "filterpy", "lz4", "mcap", "osqp", "plotly", "pymsis", "rosbags", "skyfield", "zstandard"}
+BY_PIP = {
+    "clarabel",
+    "control",
+    "filterpy",
+    "lz4",
+    "mcap",
+    "osqp",
+    "plotly",
+    "pymsis",
+    "rosbags",
+    "skyfield",
+    "zstandard",
+}
 """Those that it does not."""
 
 

@@ -22,6 +22,11 @@ DESIGN_MODELS = {
 }
 """Linear models, the same in every revolution, that a law can be designed on."""
 
+CLOSED_FORM_MODELS = {
+    name: _about(model) for name, model in MODELS.items() if issubclass(model, LinearModel) and model.has_closed_form
+}
+"""Linear models, repeating or not, whose motion over any time costs the same."""
+
 TIME_INVARIANT_MODELS = tuple(name for name in DESIGN_MODELS if MODELS[name].is_time_invariant)
 """Those of `DESIGN_MODELS` that do not vary along the orbit."""
 
