@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from formation_gnc.common import CommonParameters
 from formation_gnc.control.cone_programme import ConeError, ConeProgramme
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
-from formation_gnc.control.models import CLOSED_FORM_MODELS
+from formation_gnc.control.models import CLOSED_FORM_MODELS, check_along_track
 from formation_gnc.control.mpc_constraints import in_eclipse
 from formation_gnc.control.path_constraints import TOLERANCE, ApproachCone, KeepOut, Path, PathConstraint, SpeedLimit
 from formation_gnc.control.plan import Plan, held_over_tick
@@ -180,11 +180,7 @@ class Convex(Controller[ConvexParameters]):
             raise DesignError("convex: no_thrust must be pairs of a begin and a later end")
         if own.cone_half_angle > 0.0 and not np.linalg.norm(own.cone_axis) > 0.0:
             raise DesignError("convex: cone_axis must not be zero")
-        if not self._limit[1] > 0.0:
-            raise DesignError(
-                f"convex: thrust_limit along the track is {self._limit[1]:g} N; it must be above 0 for control in the "
-                "orbit plane"
-            )
+        check_along_track("convex", self._limit)
 
     def figures(self) -> dict[str, Any]:
         """Steps of the plans."""

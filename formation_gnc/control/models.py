@@ -48,11 +48,16 @@ def near_circular_rates(law: str, common: CommonParameters, limit: Vector) -> tu
             f"{law}: chief.eccentricity is {common.chief.eccentricity:g}; it must be below {DISTINCT_PERIGEE:g}, "
             "near-circular"
         )
+    check_along_track(law, limit)
+    return J2MeanMotionModel.about(common.chief_elements).frequencies
+
+
+def check_along_track(law: str, limit: Vector) -> None:
+    """Raise DesignError for a thrust limit (3,), N, that leaves the motion in the orbit plane uncontrolled."""
     if not limit[1] > 0.0:
         raise DesignError(
             f"{law}: thrust_limit along the track is {limit[1]:g} N; it must be above 0 for control in the orbit plane"
         )
-    return J2MeanMotionModel.about(common.chief_elements).frequencies
 
 
 PLAN_MODELS: dict[str, Callable[[Elements], FactorisedModel]] = {
