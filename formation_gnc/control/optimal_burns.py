@@ -27,6 +27,9 @@ FINER = 6
 ROUNDS = 3
 """Of added times: the last are a revolution over 48 * 6^3 apart."""
 
+EARLY = 1e-3
+"""Price of a burn at the end of the horizon above that of one now: of like ones the first is taken, never put off."""
+
 OPTIMALITY = 1e-2
 """Largest excess of a plan over the bound that counts as solved, whatever the solver says."""
 
@@ -80,11 +83,13 @@ def least_burns(model: LinearModel, time: float, error: Vector, horizon: float, 
     effects = _effects(model, time, times, unit)[:, :, used]
     for remaining in reversed(range(ROUNDS + 1)):
         forced = effects[:, rows].transpose(1, 0, 2).reshape(len(rows), -1)
-        dual, magnitudes = _least_sum(forced, wanted[rows])
+        price = 1.0 + EARLY / horizon * times
+        dual, magnitudes = _least_sum(forced, wanted[rows], np.repeat(price, len(used)))
         primer = np.abs(np.einsum("r,mra->ma", dual, effects[:, rows])).max(axis=1)
-        beside = np.pad(primer, 1)
-        peaks = np.flatnonzero((primer >= beside[:-2]) & (primer >= beside[2:]))
-        peaks = peaks[primer[peaks] > 1.0 - 10.0 * ENOUGH] if remaining else peaks[:0]
+        worth = primer / price
+        beside = np.pad(worth, 1)
+        peaks = np.flatnonzero((worth >= beside[:-2]) & (worth >= beside[2:]))
+        peaks = peaks[worth[peaks] > 1.0 - 10.0 * ENOUGH] if remaining else peaks[:0]
         added = _beside(times, peaks, horizon / len(times) / FINER**ROUNDS)
         if not len(added):
             break
@@ -103,15 +108,15 @@ def least_burns(model: LinearModel, time: float, error: Vector, horizon: float, 
     return BurnPlan(*_merged(times[burning], impulses[burning], model.period / TOGETHER), least)
 
 
-def _least_sum(forced: Matrix, wanted: Vector) -> tuple[Vector, Vector]:
-    """Dual (R,) and solution (C,) of the least sum of |x| with A x = b, for A (R, C); raises ArithmeticError.
+def _least_sum(forced: Matrix, wanted: Vector, price: Vector) -> tuple[Vector, Vector]:
+    """Dual (R,) and solution (C,) of the least sum of price |x| with A x = b, for A (R, C); raises ArithmeticError.
 
     What the solver reaches short of its accuracy is judged by the bound that it gives.
     """
     columns = sparse.csc_matrix(np.vstack([forced.T, -forced.T]))
     cones = [clarabel.NonnegativeConeT(columns.shape[0])]
-    zero, ones = sparse.csc_matrix((len(wanted), len(wanted))), np.ones(columns.shape[0])
-    found = clarabel.DefaultSolver(zero, -wanted, columns, ones, cones, solver_settings()).solve()
+    zero, bound = sparse.csc_matrix((len(wanted), len(wanted))), np.concatenate([price, price])
+    found = clarabel.DefaultSolver(zero, -wanted, columns, bound, cones, solver_settings()).solve()
     if found.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
         raise ArithmeticError(f"no burns: {found.status}")
     multipliers = np.array(found.z)

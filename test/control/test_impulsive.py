@@ -184,7 +184,7 @@ def test_the_least_burns_null_the_error_and_reach_their_bound():
         left = model.transition(now, 1.5 * model.period - now) @ state
         assert np.abs(left[:3]).max() < 0.05  # by impulses a five-hundredth of a revolution apart taken as one
         assert plan.least <= plan.delta_v * (1.0 + 1e-9)
-        assert plan.delta_v == pytest.approx(plan.least, rel=1e-4)
+        assert plan.delta_v == pytest.approx(plan.least, rel=1e-3)  # the price of late burns
 
 
 @given(errors)
@@ -198,7 +198,7 @@ def test_the_least_burns_are_no_dearer_than_the_closed_form(elements):
     error = near_circular_matrix(0.0, N) @ elements
     plan = least_burns(HillModel(N), 0.0, error, HORIZON / N, np.ones(3))
     assert plan.least <= closed * (1.0 + 1e-6)
-    assert plan.delta_v <= closed * (1.0 + 1e-3)
+    assert plan.delta_v <= closed * (1.0 + 2e-3)
 
 
 @pytest.mark.thorough
@@ -215,6 +215,16 @@ def test_an_eccentric_formation_is_flown_near_the_least(eccentricity):
     least = least_burns(model, 0.0, error, 1.5 * model.period, np.ones(3)).least
     assert 0.97 * least < spent.sum() < 1.1 * least
     assert np.abs(found - wanted).max() < 2.0
+
+
+def test_of_like_burns_the_first_is_taken():
+    """Across the track every node is as good: the burn is within the first revolution of three, planned anywhere."""
+    model = MODELS["tschauner_hempel"].about(Elements(1.1e7, 0.4, 1.0, 0.3, 0.4, 0.5))
+    for share in np.arange(5) / 5.0:
+        now = share * model.period
+        error = model.transition(0.0, now) @ np.array([0.0, 0.0, 100.0, 0.0, 0.0, 0.05])
+        plan = least_burns(model, now, error, 3.0 * model.period, np.ones(3))
+        assert plan.times.max() < model.period
 
 
 def test_no_thrust_along_the_track_is_rejected_by_name():
