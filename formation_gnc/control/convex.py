@@ -260,9 +260,11 @@ class Convex(Controller[ConvexParameters]):
 
     def _error(self, response: ThrustResponse, start: Vector, target: Target, goal: Vector) -> Vector:
         """(6,) error at the start whose free motion is the error at the end: the target follows its preview."""
+        if not len(target.preview):
+            return start - goal
         reached = min(round(response.count * response.step * NANOSECONDS) // target.preview_step, len(target.preview))
         index, rest = divmod(reached * target.preview_step, self._step_ns)
-        if not reached or rest:  # none, or none at the end of a step: the target moves freely
+        if not reached or rest:  # none at the end of a step: the target moves freely
             return start - goal
         moved: Vector = np.linalg.solve(response.free[index], target.preview[reached - 1])
         return start - moved
