@@ -28,6 +28,10 @@ LONGEST_BURN = 1.0 / 6.0
 """Of a burn, in revolutions: one of that length has 95 % of the effect of an impulse. The next plan does the rest."""
 
 
+WORTH = 1e-2
+"""Share of a plan's delta-v below which an impulse waits for a later plan: else it would stand before a large one."""
+
+
 @dataclass(frozen=True)
 class Burn:
     """A burn on one axis; times in s of the run."""
@@ -168,6 +172,8 @@ class OptimalBurns(BurnPlanner):
         first: dict[int, Burn] = {}
         for when, impulse in zip(plan.times.tolist(), plan.impulses.tolist(), strict=True):
             for axis in {0, 1, 2} - first.keys():
+                if abs(impulse[axis]) < WORTH * plan.delta_v:
+                    continue
                 burn = self._thrusters.burn(axis, now + when, impulse[axis], math.tau / model.period, estimate)
                 if burn is not None:
                     first[axis] = burn
