@@ -138,7 +138,6 @@ CASES = (
                 "holding_time": 1.0,
                 "step": 180.0,
             },
-            "impulsive": {"horizon": 3.0, "tolerance": 5.0},
         },
     ),
 )
@@ -223,6 +222,7 @@ is between the maps.
 
 {table}
 
-The impulsive law prices each axis for itself; `convex` the magnitude.
+`impulsive` is not beside them: it takes no horizon of less than 1.5 orbits, and with three, over the 40 orbits of the
+second, it put off a burn across the track of 0.3 m/s from plan to plan, since a later one was cheaper by J2.
 """
     return text, figures
