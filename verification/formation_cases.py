@@ -222,7 +222,7 @@ is between the maps.
 
 {table}
 
-`impulsive` is not beside them: it takes no horizon of less than 1.5 orbits, and with three, over the 40 orbits of the
-second, it put off a burn across the track of 0.3 m/s from plan to plan, since a later one was cheaper by J2.
+`impulsive` is not beside them: it takes no horizon of less than 1.5 orbits, and was not flown over the 40 of the
+second.
 """
     return text, figures

@@ -146,12 +146,12 @@ class OptimalBurns(BurnPlanner):
             self._model = CLOSED_FORM_MODELS["relative_elements"](common)
         except OrbitError:
             self._model = CLOSED_FORM_MODELS["tschauner_hempel"](common)
-        self._next = -math.inf
-        """Time of the next plan, s."""
+        self._next = self._deadline = -math.inf
+        """Time of the next plan, and that by which all burns of the first of its kind were to be made, s."""
 
     def reset(self) -> None:
         """As the base."""
-        self._next = -math.inf
+        self._next = self._deadline = -math.inf
 
     def figures(self) -> dict[str, Any]:
         """Time of a plan."""
@@ -168,7 +168,10 @@ class OptimalBurns(BurnPlanner):
         ahead = model.transitions(time, model.period * QUARTERS)[:, :3] @ (own - aim)
         if not np.abs(ahead).max() > self._tolerance:
             return []
-        plan = least_burns(model, time, own - aim, self._horizon * model.period, self._thrusters.limit)
+        horizon = self._horizon * model.period
+        if now >= self._deadline:
+            self._deadline = now + horizon
+        plan = least_burns(model, time, own - aim, horizon, self._thrusters.limit, self._deadline - now)
         first: dict[int, Burn] = {}
         for when, impulse in zip(plan.times.tolist(), plan.impulses.tolist(), strict=True):
             for axis in {0, 1, 2} - first.keys():

@@ -6,6 +6,7 @@ most one in size per axis at the given times. Where it is above one at another, 
 are added at its peaks. For any l, l . (-e) over the largest size of p is a lower bound on every plan at any times.
 """
 
+import math
 from dataclasses import dataclass
 
 import clarabel
@@ -30,8 +31,11 @@ ROUNDS = 3
 EARLY = 1e-3
 """Price of a burn at the end of the horizon above that of one now: of like ones the first is taken, never put off."""
 
+LATE = 0.1
+"""Price of a burn after the deadline above that of one before it: no gain by waiting puts it off again."""
+
 OPTIMALITY = 1e-2
-"""Largest excess of a plan over the bound that counts as solved, whatever the solver says."""
+"""Largest excess of the priced sum over its bound that counts as solved, whatever the solver says."""
 
 EXACT = 1e-7
 """Share of the error that burns may leave."""
@@ -53,7 +57,7 @@ class BurnPlan:
     impulses: Matrix
     """(M, 3) delta-v, Hill frame, m/s."""
     least: float
-    """Lower bound on the delta-v of any plan within the horizon, sum over the axes, m/s."""
+    """Lower bound on the delta-v of any plan until the deadline, else the horizon, sum over the axes, m/s."""
 
     @property
     def delta_v(self) -> float:
@@ -61,7 +65,9 @@ class BurnPlan:
         return float(np.abs(self.impulses).sum())
 
 
-def least_burns(model: LinearModel, time: float, error: Vector, horizon: float, axes: Vector) -> BurnPlan:
+def least_burns(
+    model: LinearModel, time: float, error: Vector, horizon: float, axes: Vector, deadline: float = math.inf
+) -> BurnPlan:
     """Impulses on some axes that null an error within a horizon (s), of least sum over the axes.
 
     Args:
@@ -69,6 +75,7 @@ def least_burns(model: LinearModel, time: float, error: Vector, horizon: float, 
         time: now, in the model's time, s.
         error: (6,) now, Hill frame, m and m/s.
         horizon: s.
+        deadline: time from now, s, after which a burn is dearer by the share `LATE`.
         axes: (3,) zero where there is no thrust; without any across the track that motion is left alone.
 
     Raises:
@@ -83,7 +90,7 @@ def least_burns(model: LinearModel, time: float, error: Vector, horizon: float, 
     effects = _effects(model, time, times, unit)[:, :, used]
     for remaining in reversed(range(ROUNDS + 1)):
         forced = effects[:, rows].transpose(1, 0, 2).reshape(len(rows), -1)
-        price = 1.0 + EARLY / horizon * times
+        price = 1.0 + EARLY / horizon * times + LATE * (times > deadline)
         dual, magnitudes = _least_sum(forced, wanted[rows], np.repeat(price, len(used)))
         primer = np.abs(np.einsum("r,mra->ma", dual, effects[:, rows])).max(axis=1)
         worth = primer / price
@@ -102,8 +109,9 @@ def least_burns(model: LinearModel, time: float, error: Vector, horizon: float, 
     if not np.abs(left).max() < EXACT:
         raise ArithmeticError(f"burns leave {np.abs(left).max():.1e} of the error")
     burning = np.abs(impulses).sum(axis=1) > 1e-9 * rate * scale
-    least = float(dual @ wanted[rows]) / max(float(primer.max()), 1e-300) * scale * rate
-    if not np.abs(impulses).sum() <= least * (1.0 + OPTIMALITY):
+    least = float(dual @ wanted[rows]) / max(float(primer[times <= deadline].max()), 1e-300) * scale * rate
+    priced = float(dual @ wanted[rows]) / max(float(worth.max()), 1e-300) * scale * rate
+    if not float(price @ np.abs(impulses).sum(axis=1)) <= priced * (1.0 + OPTIMALITY):
         raise ArithmeticError(f"burns of {np.abs(impulses).sum():.4g} m/s beside a least of {least:.4g} m/s")
     return BurnPlan(*_merged(times[burning], impulses[burning], model.period / TOGETHER), least)
 

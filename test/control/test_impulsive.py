@@ -209,7 +209,7 @@ def test_an_eccentric_formation_is_flown_near_the_least(eccentricity):
     start, goal = [0.0, 300.0, 50.0, 100.0, -60.0, 80.0], [0.0, 0.0, 100.0, 150.0, 0.0, 100.0]
     chief = {f"chief__{name}": value for name, value in vars(orbit).items()}
     law = manager(tick=30.0, thrust_limit=(1.0, 1.0, 1.0), mass=1340.0, impulsive__tolerance=0.5, **chief)
-    spent, found, wanted = fly(start, goal, law, 2.5, orbit)
+    spent, found, wanted = fly(start, goal, law, 3.2, orbit)  # two horizons, and the last burn
     model = MODELS["relative_elements"].about(orbit)
     error = hill_matrix(model.elements) @ (np.array(start) - goal)
     least = least_burns(model, 0.0, error, 1.5 * model.period, np.ones(3)).least
@@ -225,6 +225,19 @@ def test_of_like_burns_the_first_is_taken():
         error = model.transition(0.0, now) @ np.array([0.0, 0.0, 100.0, 0.0, 0.0, 0.05])
         plan = least_burns(model, now, error, 3.0 * model.period, np.ones(3))
         assert plan.times.max() < model.period
+
+
+def test_no_burn_is_put_off_beyond_its_deadline():
+    """At e = 0.4 and i = 10 deg J2 makes a later burn across the track cheaper, but not by a tenth."""
+    model = MODELS["relative_elements"].about(Elements(1.1e7, 0.4, 0.17453, 0.0, 1.2217, 0.0))
+    error = np.array([0.0, 0.0, 500.0, 0.0, 0.0, 0.3])
+    plans = [
+        least_burns(model, 0.0, error, 3.0 * model.period, np.ones(3), deadline)
+        for deadline in (math.inf, 1.5 * model.period)
+    ]
+    large = np.abs(plans[1].impulses).max(axis=1) > 1e-3 * plans[1].delta_v
+    assert plans[1].times[large].max() <= 1.5 * model.period
+    assert plans[0].delta_v <= plans[1].delta_v <= 1.1 * plans[0].delta_v
 
 
 def test_no_thrust_along_the_track_is_rejected_by_name():
