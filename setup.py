@@ -11,6 +11,7 @@ NODES = ["plant", "satellite", "display", "recorder", "replay"]
 
 # What a wheel asks for: newest versions that are tried are those of requirements.lock, oldest those given here.
 REQUIREMENTS = [
+    "clarabel>=0.11,<0.12",
     "control>=0.10.1,<0.11",
     "cryptography>=41",
     "dask>=2025.5",

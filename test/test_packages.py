@@ -105,17 +105,8 @@ IN_DISTRIBUTIONS = {"cryptography", "matplotlib", "numba", "numpy", "rich", "sci
 """Modules of packages that rosdep installs from a distribution (rosdistro, rosdep/python.yaml)."""
 
 BY_PIP = {
-    "control",
-    "filterpy",
-    "lz4",
-    "mcap",
-    "osqp",
-    "plotly",
-    "pymsis",
-    "rosbags",
-    "setproctitle",
-    "skyfield",
-    "zstandard",
+    *("clarabel", "control", "filterpy", "lz4", "mcap", "osqp", "plotly", "pymsis", "rosbags", "setproctitle"),
+    *("skyfield", "zstandard"),
 }
 """Those that it does not."""
 

@@ -101,8 +101,10 @@ SHARED, TWO_BODY, OBLATE = (Setting(17.0, shared=True, truth=truth) for truth in
 SETTINGS = (PRINTED, FIXED, SHARED, TWO_BODY, OBLATE)
 
 
-def scenario(acquisition: Acquisition, setting: Setting) -> Scenario:
-    """All that flies, from the slots of the formation that is left.
+def scenario(
+    acquisition: Acquisition, setting: Setting, changes: Mapping[str, Mapping[str, Any]] | None = None
+) -> Scenario:
+    """All that flies, from the slots of the formation that is left, with changes of guidance and controller.
 
     Weights are those of the listing of netSATmpc, squared over scales of 4 m (along-track) and 2 m and their
     rates. A plan of an orbit, and a horizon of four thirds of one, both in whole steps.
@@ -127,6 +129,9 @@ def scenario(acquisition: Acquisition, setting: Setting) -> Scenario:
             "mpc.velocity_error": [0.002 / setting.weight, 0.004 / setting.weight, 0.002 / setting.weight],
         },
     }
+
+    for node, values in (changes or {}).items():
+        common[node] |= values
 
     def load(formation: str, plant: dict[str, Any], assignment: str) -> Scenario:
         guidance = common["/**/guidance"] | {"formation": formation, "assignment": assignment}

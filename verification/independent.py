@@ -158,6 +158,28 @@ class _Sky(sysModel.SysModel):
         self.earth.write(payload, now, self.moduleID)
 
 
+def basilisk_earth(forces: Forces) -> Any:
+    """The Earth as Basilisk's spacecraft feel it, with this project's constants and harmonics."""
+    earth = gravityEffector.GravBodyData()
+    earth.planetName = "earth"
+    earth.mu, earth.radEquator, earth.isCentralBody = MU, EARTH_RADIUS, True
+    degree = forces.harmonics_degree or forces.zonal_degree
+    if degree >= 2:
+        with TemporaryDirectory() as folder:
+            path = Path(folder) / "field.txt"
+            rows = [f"{EARTH_RADIUS!r},{MU!r},0,{degree},{degree},1,0,0"]
+            for n in range(degree + 1):
+                for m in range(n + 1):
+                    keep = m == 0 or forces.harmonics_degree >= 2
+                    c, s = (NORMALISED_C[n, m], NORMALISED_S[n, m]) if keep else (0.0, 0.0)
+                    rows.append(f"{n},{m},{float(c)!r},{float(s)!r},0,0")
+            path.write_text("\n".join(rows) + "\n")
+            earth.useSphericalHarmonicsGravityModel(str(path), degree)
+    else:
+        earth.usePointMassGravityModel()
+    return earth
+
+
 @dataclass
 class Basilisk:
     """A Basilisk simulation of spacecraft under the given forces.
@@ -194,27 +216,6 @@ class Basilisk:
         self._craft = [self._spacecraft(index, state) for index, state in enumerate(self.states)]
         self._simulation.InitializeSimulation()
 
-    def _earth(self) -> Any:
-        forces = self.forces
-        earth = gravityEffector.GravBodyData()
-        earth.planetName = "earth"
-        earth.mu, earth.radEquator, earth.isCentralBody = MU, EARTH_RADIUS, True
-        degree = forces.harmonics_degree or forces.zonal_degree
-        if degree >= 2:
-            with TemporaryDirectory() as folder:
-                path = Path(folder) / "field.txt"
-                rows = [f"{EARTH_RADIUS!r},{MU!r},0,{degree},{degree},1,0,0"]
-                for n in range(degree + 1):
-                    for m in range(n + 1):
-                        keep = m == 0 or forces.harmonics_degree >= 2
-                        c, s = (NORMALISED_C[n, m], NORMALISED_S[n, m]) if keep else (0.0, 0.0)
-                        rows.append(f"{n},{m},{float(c)!r},{float(s)!r},0,0")
-                path.write_text("\n".join(rows) + "\n")
-                earth.useSphericalHarmonicsGravityModel(str(path), degree)
-        else:
-            earth.usePointMassGravityModel()
-        return earth
-
     def _spacecraft(self, index: int, state: Array) -> Any:
         forces, body = self.forces, self.body
         craft = spacecraft.Spacecraft()
@@ -222,7 +223,7 @@ class Basilisk:
         craft.hub.mHub = body.mass
         craft.hub.IHubPntBc_B = [[10.0, 0.0, 0.0], [0.0, 10.0, 0.0], [0.0, 0.0, 10.0]]
         craft.hub.r_CN_NInit, craft.hub.v_CN_NInit = state[:3], state[3:]
-        bodies = [self._earth()]
+        bodies = [basilisk_earth(self.forces)]
         if self._sky is not None:
             bodies[0].planetBodyInMsg.subscribeTo(self._sky.earth)
         for wanted, mu, name in ((forces.sun, MU_SUN, "sun"), (forces.moon, MU_MOON, "moon")):

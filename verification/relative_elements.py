@@ -39,7 +39,9 @@ from formation_gnc.relative.relative_elements import (
 )
 from formation_gnc.types import NANOSECONDS
 from verification.figure import TABLE, Cell, Figure, failures
+from verification.formation_cases import formations
 from verification.independent import Heyoka
+from verification.low_thrust import acquisitions
 
 Array = NDArray[np.float64]
 
@@ -201,7 +203,7 @@ def main(directory: Path) -> int:
     """Write the page; return how many figures are outside their tolerance."""
     directory.mkdir(parents=True, exist_ok=True)
     sections, figures = [], []
-    for part in (round_trips, transitions, reconfiguration):
+    for part in (round_trips, transitions, reconfiguration, formations, acquisitions):
         text, limits = part()
         rows = [each.row for each in limits if not isinstance(each, Cell) or not each.holds]
         sections.append("\n".join([text, TABLE, *rows, ""]))

@@ -22,6 +22,11 @@ DESIGN_MODELS = {
 }
 """Linear models, the same in every revolution, that a law can be designed on."""
 
+CLOSED_FORM_MODELS = {
+    name: _about(model) for name, model in MODELS.items() if issubclass(model, LinearModel) and model.has_closed_form
+}
+"""Linear models, repeating or not, whose motion over any time costs the same."""
+
 TIME_INVARIANT_MODELS = tuple(name for name in DESIGN_MODELS if MODELS[name].is_time_invariant)
 """Those of `DESIGN_MODELS` that do not vary along the orbit."""
 
@@ -43,11 +48,16 @@ def near_circular_rates(law: str, common: CommonParameters, limit: Vector) -> tu
             f"{law}: chief.eccentricity is {common.chief.eccentricity:g}; it must be below {DISTINCT_PERIGEE:g}, "
             "near-circular"
         )
+    check_along_track(law, limit)
+    return J2MeanMotionModel.about(common.chief_elements).frequencies
+
+
+def check_along_track(law: str, limit: Vector) -> None:
+    """Raise DesignError for a thrust limit (3,), N, that leaves the motion in the orbit plane uncontrolled."""
     if not limit[1] > 0.0:
         raise DesignError(
             f"{law}: thrust_limit along the track is {limit[1]:g} N; it must be above 0 for control in the orbit plane"
         )
-    return J2MeanMotionModel.about(common.chief_elements).frequencies
 
 
 PLAN_MODELS: dict[str, Callable[[Elements], FactorisedModel]] = {

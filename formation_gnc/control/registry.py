@@ -6,6 +6,7 @@ from formation_gnc.control.adaptive_lqr import AdaptiveLinearQuadraticRegulator
 from formation_gnc.control.asre import Asre
 from formation_gnc.control.coast import Coast
 from formation_gnc.control.controller import Controller
+from formation_gnc.control.convex import Convex
 from formation_gnc.control.dynamic_inversion import DynamicInversion
 from formation_gnc.control.finite_horizon import FiniteHorizonController
 from formation_gnc.control.gmpsp import GmpspController
@@ -34,6 +35,7 @@ ALGORITHMS: dict[str, type[Controller[Any]]] = {
     "dynamic_inversion": DynamicInversion,
     "impulsive": Impulsive,
     "roe_lyapunov": RoeLyapunov,
+    "convex": Convex,
     "adaptive_lqr": AdaptiveLinearQuadraticRegulator,
 }
 ALGORITHMS.update(load_plugins("laws", Controller, ALGORITHMS))

@@ -16,7 +16,7 @@ LOST = "lost messages"
 IGNORED = "messages of other publishers"
 """Name of the metadata record with the number of messages by topic that the recorder left out."""
 
-PACKAGES = ("numpy", "scipy", "numba", "filterpy", "osqp", "mcap")
+PACKAGES = ("numpy", "scipy", "numba", "filterpy", "osqp", "clarabel", "mcap")
 """Packages on which the numbers of a run depend."""
 
 

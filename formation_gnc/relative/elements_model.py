@@ -14,7 +14,7 @@ from formation_gnc.relative.chief import KeplerChief
 from formation_gnc.relative.element_differences import check_node
 from formation_gnc.relative.model import ON_THE_CHIEF, Array, LinearModel
 from formation_gnc.relative.nonlinear import jacobian
-from formation_gnc.relative.relative_elements import hill_matrix, j2_transition
+from formation_gnc.relative.relative_elements import hill_matrix, j2_transition, mean_relative_elements
 
 TURN = 1e-4
 """Turn of the perigee by which the map is differentiated, rad: a relative error of 1e-9."""
@@ -70,6 +70,13 @@ class RelativeElementsModel(LinearModel):
             return replace(self, elements=advanced(elements_from_state(mean_state(chief)), -time))
         except OrbitError:
             return self
+
+    def averaged(self, chief: Array, state: Array) -> Array:
+        """(6,) relative state of the mean orbits of an inertial state (6,) and of one relative to it (6,)."""
+        try:
+            return hill_matrix(elements_from_state(mean_state(chief))) @ mean_relative_elements(chief, state)
+        except OrbitError:
+            return state
 
     def phase_rates(self, time: float) -> tuple[float, float]:
         """Rate of the chief's true anomaly, and of its argument of latitude, rad/s."""

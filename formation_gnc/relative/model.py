@@ -170,6 +170,13 @@ class LinearModel(RelativeModel):
         """The model about the orbit that an inertial state (6,) of the chief is on at a time (s)."""
         return self
 
+    def averaged(self, chief: Array, state: Array) -> Array:
+        """(6,) relative state as the model has it, of one (6,) that is flown about a chief's inertial state (6,).
+
+        Without the short-period perturbations if the model leaves them out; elsewhere the same.
+        """
+        return state
+
     def continued(self, state: Array, other: Self) -> Array:
         """(6,) state at time zero, in this model, of the motion that has a state (6,) there in another anchoring."""
         return state

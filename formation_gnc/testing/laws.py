@@ -140,11 +140,14 @@ def test_the_law_recovers_after_invalid_inputs(algorithm: str) -> None:
     manager, state = manager_of(algorithm, mpc__thrust_rate=1e-4), np.array([5.0, -8.0, 0.0, 0.0, 0.0, 0.0])
     huge = np.array([1e308, -1e308, 1e308, -1e308, 1e308, -1e308])
     bad = [np.full(6, np.nan), np.full(6, np.inf), huge, np.full(6, 1e200), np.full(6, 1e15)]
+    pushed = []
     for tick, wrong in enumerate([*bad, *bad, *[state] * 20]):
         mass = np.nan if tick < len(bad) else 100.0
         seen = estimate_of(wrong, 10.0 * tick, mass, CHIEF)
         thrust, _ = manager.on_tick(seen, target_of(time=10.0 * tick))
-    assert thrust.force.any() == (algorithm != "coast")
+        pushed.append(bool(thrust.force.any()))
+    # A law that plans burns pushes when they are due, not at every tick.
+    assert any(pushed[2 * len(bad) :]) == (algorithm != "coast")
 
 
 @pytest.mark.parametrize("mass", [-100.0, 0.0, np.inf, np.nan])
