@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from formation_gnc.campaign.case import CASE, REASON
+from formation_gnc.campaign.case import CASE, REASON, nominal_scenario
 from formation_gnc.campaign.dataset import Dataset
 from formation_gnc.campaign.definition import Campaign
 from formation_gnc.campaign.flight_figures import BANDS, NUMBERS, OF_RUN, band
@@ -67,9 +67,8 @@ class Flights:
         """Read nothing yet."""
         self.campaign, self.results = campaign, results
         self.names = results.names()
-        self.deputies = list(
-            dict.fromkeys(name.rpartition(".")[0] for name in self.names if name.endswith(".final_error_m"))
-        )
+        self.deputies = {each.name: nominal_scenario(campaign, each).plant.deputies for each in campaign.configurations}
+        """By configuration."""
 
     def column(self, name: str, configuration: str) -> Values:
         """A column of one configuration; NaN where it has no value."""
@@ -85,18 +84,17 @@ class Flights:
             configuration: its name.
             upper: whether large values are bad.
         """
-        columns = self._columns(name)
+        columns = self._columns(name, configuration)
         found = [self.column(each, configuration) for each in columns]
-        if not found:
-            return self.column(name, configuration)
         both = np.array([each.values for each in found])
         missing = np.isnan(both).any(axis=0)
         worst = both.max(axis=0, initial=-np.inf) if upper else both.min(axis=0, initial=np.inf)
         return Values(found[0].cases, np.where(missing, nan, worst), found[0].reasons)
 
-    def _columns(self, name: str) -> list[str]:
-        own = name in OF_RUN or name.partition(".")[0] in self.deputies
-        return [name] if own else [f"{deputy}.{name}" for deputy in self.deputies]
+    def _columns(self, name: str, configuration: str) -> list[str]:
+        deputies = self.deputies[configuration]
+        own = name in OF_RUN or name.partition(".")[0] in deputies
+        return [name] if own else [f"{deputy}.{name}" for deputy in deputies]
 
     def outcomes(self) -> list[Outcome]:
         """Verdict on every requirement in every configuration."""
@@ -137,7 +135,7 @@ class Flights:
     def _outside(self, name: str, configuration: str) -> Values:
         """How far each flight is outside the band of a figure, of the deputy which is furthest; 0 inside."""
         worst: Values | None = None
-        for column in self._columns(name):
+        for column in self._columns(name, configuration):
             ratio, freedom = self._with_freedom(column, configuration)
             bounds = np.array([band(each) if each > 0.0 else (nan, nan) for each in freedom.values]).reshape(-1, 2)
             beyond = np.maximum(np.maximum(bounds[:, 0] - ratio.values, ratio.values - bounds[:, 1]), 0.0)
@@ -155,7 +153,7 @@ class Flights:
         from scipy.stats import chi2
 
         total, freedom, runs, lost = 0.0, 0.0, 0, 0
-        for column in self._columns(requirement.figure):
+        for column in self._columns(requirement.figure, configuration):
             ratio, weight = self._with_freedom(column, configuration)
             good = ~np.isnan(ratio.values * weight.values)
             total += float(ratio.values[good] @ weight.values[good])

@@ -107,7 +107,7 @@ def _summary(flights: Flights) -> dict[str, Any]:
     campaign, manifest = flights.campaign, flights.results.manifest
     wall = [each for each in flights.results.table(["wall_time_s"], TIMING)["wall_time_s"].to_pylist() if each]
     rows: dict[str, Any] = {
-        "scenario": campaign.scenario.stem,
+        "scenario": ", ".join(each.stem for each in campaign.scenarios),
         "cases": campaign.runs,
         "configurations": ", ".join(each.name for each in campaign.configurations),
         "seed": campaign.seed,
@@ -146,7 +146,7 @@ def _parts(flights: Flights) -> Iterator[tuple[str, str, list[list[Plot]]]]:
     if plots:
         yield "Distributions", "<p>Share of the flights below a value, with its 95 % band.</p>", _in_two(plots)
     for configuration in campaign.configurations[:OVER_TIME]:
-        for deputy in flights.deputies:
+        for deputy in flights.deputies[configuration.name]:
             words = f"Error over time: {deputy}" + ("" if configuration.name == NOMINAL else f", {configuration.name}")
             yield words, "", [errors_over_time(flights, configuration.name, deputy)]
     first = campaign.configurations[0].name
