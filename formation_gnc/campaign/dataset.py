@@ -64,9 +64,10 @@ class Dataset:
         for name in (CASES, ERRORS, TIMING):
             (self.directory / name).mkdir(parents=True, exist_ok=True)
         names = {"scenario": "scenario", "campaign": f"{campaign.name}.yaml"}
-        (self.directory / names["scenario"]).mkdir(exist_ok=True)
-        for scenario in campaign.scenarios:
-            shutil.copyfile(scenario, self.directory / names["scenario"] / f"{scenario.stem}.yaml")
+        for name, path in campaign.copied().items():
+            copy = self.directory / names["scenario"] / name
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(path, copy)
         (self.directory / names["campaign"]).write_text(campaign.text, encoding="utf-8")
         manifest = {"identity": campaign.identity, "version": version, "commit": commit, "block": block, **names}
         _replace(self.directory / MANIFEST, lambda path: path.write_text(json.dumps(manifest, indent=2) + "\n"))

@@ -19,7 +19,7 @@ from formation_gnc.plain_file import read_plain
 from formation_gnc.randomness import generator
 from formation_gnc.shipped import find_shipped
 from formation_gnc.sil.overrides import address_of
-from formation_gnc.sil.scenario import find_scenario, load_scenario
+from formation_gnc.sil.scenario import extended, find_scenario, load_scenario
 
 SCENARIO = "scenario"
 """Key of the scenario, of the campaign or of a variant that flies another one."""
@@ -76,8 +76,26 @@ class Campaign:
     @property
     def identity(self) -> str:
         """Digest of all that decides on the flights besides the software, but not of how many there are."""
-        scenarios = "\n".join(path.read_text() for path in self.scenarios)
+        scenarios = "\n".join(path.read_text() for each in self.scenarios for path in extended(each))
         return sha256(f"{self.text}\n{self.seed}\n{scenarios}".encode()).hexdigest()
+
+    def copied(self) -> dict[str, Path]:
+        """Files of the scenarios, with those beside them that they extend, by path in a directory of copies.
+
+        Raises:
+            ConfigurationError: two have the same name, or one extends a file further up.
+        """
+        files: dict[str, Path] = {}
+        for scenario in self.scenarios:
+            for path in extended(scenario):
+                if not path.is_relative_to(scenario.parent):
+                    continue  # shipped, and found by its name
+                name = f"{scenario.stem}.yaml" if path == scenario else str(path.relative_to(scenario.parent))
+                if ".." in Path(name).parts:
+                    raise ConfigurationError(f"scenario {scenario}: extends a file further up; put it beside it")
+                if files.setdefault(name, path) != path:
+                    raise ConfigurationError(f"scenarios {files[name]} and {path}: have the same name")
+        return files
 
     @property
     def within(self) -> tuple[float, ...]:
@@ -136,8 +154,6 @@ def _campaign(path: Path, text: str, document: Any, runs: int | None, copies: Pa
     seed = _whole("seed", document.get("seed", 1), 0)
     configurations = tuple(_configurations(document, seed, path.parent, copies))
     scenarios = tuple(dict.fromkeys(each.scenario for each in configurations))
-    if len({each.stem for each in scenarios}) < len(scenarios):
-        raise ConfigurationError(f"scenarios {', '.join(map(str, scenarios))}: two have the same name")
     # a requirement may name a deputy that all configurations have
     fleets = [load_scenario(str(each.scenario), each.overrides).plant.deputies for each in configurations]
     deputies = [name for name in fleets[0] if all(name in fleet for fleet in fleets)]
@@ -146,7 +162,9 @@ def _campaign(path: Path, text: str, document: Any, runs: int | None, copies: Pa
         raise ConfigurationError(f"requirements: {statements!r} is not allowed; it must be a list of statements")
     requirements = tuple(requirement_of(each, deputies) for each in statements)
     runs = _whole("runs", document.get("runs", 852) if runs is None else runs, 1)
-    return Campaign(path.stem, text, scenarios, seed, runs, configurations, dispersions, faults, requirements)
+    campaign = Campaign(path.stem, text, scenarios, seed, runs, configurations, dispersions, faults, requirements)
+    campaign.copied()
+    return campaign
 
 
 def _whole(name: str, value: Any, least: int) -> int:
