@@ -1,6 +1,5 @@
 """What a campaign's data set says: verdicts, dispersions that were not applied, what hurts, paired differences."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import nan, sqrt
 from pathlib import Path
@@ -252,22 +251,28 @@ class Difference:
 
 def differences(flights: Flights, figure: str, upper: bool = True) -> list[Difference]:
     """Paired differences of a figure to the first configuration."""
+    first, *others = (each.name for each in flights.campaign.configurations)
+    found = (difference(flights, figure, name, first, upper) for name in others)
+    return [each for each in found if each is not None]
+
+
+def difference(
+    flights: Flights, figure: str, configuration: str, reference: str, upper: bool = True
+) -> Difference | None:
+    """Paired difference of a figure between two configurations; None with fewer than two pairs."""
     from scipy.stats import t
 
-    names: Sequence[str] = [each.name for each in flights.campaign.configurations]
-    reference = flights.figure(figure, names[0], upper)
-    found = []
-    for name in names[1:]:
-        own = flights.figure(figure, name, upper)
-        common, here, there = np.intersect1d(reference.cases, own.cases, return_indices=True)
-        pairs = own.values[there] - reference.values[here]
-        pairs = pairs[np.isfinite(pairs)]
-        if len(common) and len(pairs) > 1:
-            mean = float(pairs.mean())
-            half = float(t.ppf(0.975, len(pairs) - 1)) * float(pairs.std(ddof=1)) / sqrt(len(pairs))
-            better = float(np.mean(pairs < 0.0))
-            found.append(Difference(name, names[0], figure, mean, mean - half, mean + half, better, len(pairs)))
-    return found
+    one, other = (flights.figure(figure, name, upper) for name in (configuration, reference))
+    _, here, there = np.intersect1d(one.cases, other.cases, return_indices=True)
+    pairs = one.values[here] - other.values[there]
+    pairs = pairs[np.isfinite(pairs)]
+    if len(pairs) < 2:
+        return None
+    mean = float(pairs.mean())
+    half = float(t.ppf(0.975, len(pairs) - 1)) * float(pairs.std(ddof=1)) / sqrt(len(pairs))
+    return Difference(
+        configuration, reference, figure, mean, mean - half, mean + half, float(np.mean(pairs < 0.0)), len(pairs)
+    )
 
 
 def departing_figures(results: Dataset, case: int, configuration: str, bag: Path) -> list[str] | None:

@@ -56,7 +56,8 @@ def errors_over_time(flights: Flights, configuration: str, deputy: str) -> list[
     names = ["deputy", *AXES]
     found = flights.results.table(names, ERRORS, min(flights.campaign.runs, CURVES), configuration)
     rows = [number for number, name in enumerate(found["deputy"].to_pylist()) if name == deputy]
-    plant = nominal_scenario(flights.campaign, flights.campaign.configurations[0]).plant
+    meant = next(each for each in flights.campaign.configurations if each.name == configuration)
+    plant = nominal_scenario(flights.campaign, meant).plant
     time = curve_ticks(plant.ticks) * plant.tick / 3600.0
     plots = []
     for number, axis in enumerate(AXES):
