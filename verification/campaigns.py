@@ -153,9 +153,10 @@ def _words(pair: Difference) -> str:
 def same_bits(rows: Sequence[Sequence[str]]) -> str:
     """Part of the page on bits."""
     words = (
-        f"The default campaign, shortened to {campaign_bits.DURATION:g} s and {campaign_bits.RUNS} cases. Digests of "
-        "the sorted data sets of cases and errors beside those of one worker; cases flown again alone with a bag, by "
-        "`--only N --bag DIR` and `--on-graph`."
+        f"The default campaign, shortened to {campaign_bits.DURATION:g} s and {campaign_bits.RUNS} cases. Digests of\n"
+        "the sorted data sets of cases and errors beside those of one worker; what is killed, is so once "
+        f"{campaign_bits.KILLED_AT} cases\nare there. Cases flown again alone with a bag, by `--only N --bag DIR` and "
+        "`--on-graph`."
     )
     cells = [[*row[:2], row[2] or "the same"] for row in rows]
     return f"## The same bits\n\n{words}\n\n{table(('flown by', 'how it went', 'bits'), cells)}\n"
