@@ -44,7 +44,7 @@ def distribution(flights: Flights, requirement: Requirement) -> Plot:
         edge = Style(style.colour, line="dotted", width=0.7)
         curves.append(Curve(configuration.name, ordered[rows], share, style))
         for bound in (np.clip(share - half, 0.0, 100.0), np.clip(share + half, 0.0, 100.0)):
-            curves.append(Curve(f"{configuration.name}, {100 * CONFIDENCE:g} % band", ordered[rows], bound, edge))
+            curves.append(Curve(configuration.name, ordered[rows], bound, edge))
     if isfinite(requirement.limit):
         limit = np.full(2, requirement.limit)
         curves.append(Curve("limit", limit, np.array([0.0, 100.0]), Style(RED, line="dashed")))

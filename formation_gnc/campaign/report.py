@@ -154,7 +154,7 @@ def _parts(flights: Flights) -> Iterator[tuple[str, str, list[Plot]]]:
     asked, campaign = _figures_of(flights), flights.campaign
     plots = [distribution(flights, each) for each in asked]
     if plots:
-        yield "Distributions", "<p>Share of the flights below a value, with its 95 % band.</p>", plots
+        yield "Distributions", "<p>Share of the flights below a value; dotted, its 95 % band.</p>", plots
     for configuration in campaign.configurations[:OVER_TIME]:
         for deputy in flights.deputies[configuration.name]:
             words = f"Error over time: {deputy}" + ("" if configuration.name == NOMINAL else f", {configuration.name}")
