@@ -172,7 +172,9 @@ def main(directory: Path) -> int:
     found = kept()
     rows = found.get(BITS, [])
     names = [name for name in TEXTS if name in found] + sorted({*found} - {*TEXTS, BITS})
-    parts = [HEADING, *(section(name, found[name]) for name in names), *([same_bits(rows)] if rows else [])]
+    missing = [name for name in TEXTS if name not in found]
+    lacking = f"Not flown yet, so without a verdict here: {', '.join(missing)}.\n" if missing else ""
+    parts = [HEADING, lacking, *(section(name, found[name]) for name in names), *([same_bits(rows)] if rows else [])]
     (directory / PAGE).write_text("\n".join(parts), encoding="utf-8")
     return sum(found[name]["raised"] for name in names) + sum(bool(row[2]) for row in rows)
 
