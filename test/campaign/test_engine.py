@@ -180,3 +180,13 @@ def test_scheduler_that_does_not_answer_is_named(file, tmp_path, monkeypatch, ca
     assert main(words) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("formation-gnc: scheduler tcp://127.0.0.1:9: cannot be reached")
+
+
+def test_workers_that_do_not_start_are_told_in_one_line(file, tmp_path, monkeypatch, capsys):
+    def late(*_, **__):
+        raise TimeoutError
+
+    monkeypatch.setattr("distributed.LocalCluster", late)
+    assert main(["campaign", str(file), "--out", str(tmp_path / "results")]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("formation-gnc: workers cannot be started (TimeoutError); 0 of 6 cases kept")
