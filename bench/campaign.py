@@ -5,13 +5,14 @@ import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from itertools import count
 from multiprocessing import get_context
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 from unittest.mock import patch
 
-from bench.result import Result
+from bench.result import Result, interleaved
 from formation_gnc.campaign import engine
 from formation_gnc.campaign.dataset import Dataset
 from formation_gnc.campaign.definition import Campaign, load_campaign
@@ -19,8 +20,11 @@ from formation_gnc.campaign.engine import Cluster
 from formation_gnc.campaign.version import software_version
 from formation_gnc.campaign.worker import fly_range
 
-CASES = 60
-"""Cases of a measurement, of a second of processor time or so each."""
+CASES = 40
+"""Cases of a measurement, of half a second of processor time or so each."""
+
+ROUNDS = 3
+"""Measurements of each, in turn."""
 
 MILLION = 1_000_000
 
@@ -86,8 +90,14 @@ def run() -> list[Result]:
     ):
         _by_campaign(directory, cluster, "warm", 4 * cores)
         _by_pool(directory, pool, "warm_pool", 4 * cores)
-        ours = _by_campaign(directory, cluster, "ours", CASES)
-        theirs = _by_pool(directory, pool, "theirs", CASES)
+        names = count()
+        ours, theirs = interleaved(
+            (
+                lambda: _by_campaign(directory, cluster, f"ours_{next(names)}", CASES),
+                lambda: _by_pool(directory, pool, f"theirs_{next(names)}", CASES),
+            ),
+            ROUNDS,
+        )
     with tempfile.TemporaryDirectory() as directory, _cluster(1) as one:
         _by_campaign(directory, one, "warm", 4)
         alone = _by_campaign(directory, one, "alone", CASES // cores)

@@ -35,6 +35,11 @@ def _web(name: str) -> str:
     return (files("formation_gnc.analysis") / "web" / name).read_text(encoding="utf-8")
 
 
+def side_by_side(sections: Iterable[str]) -> str:
+    """Sections in as many columns as there is room for."""
+    return f'<div class="columns">{"".join(sections)}</div>'
+
+
 def section(heading: str, figure: go.Figure, over_time: bool = False) -> str:
     """A figure under its heading, with a button that saves it as SVG.
 
@@ -66,4 +71,4 @@ def table_of(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
     """Rows below a head."""
     top = "".join(f"<th>{escape(each)}</th>" for each in head)
     body = "".join("<tr>" + "".join(f"<td>{escape(str(cell))}</td>" for cell in row) + "</tr>" for row in rows)
-    return f"<table><tr>{top}</tr>{body}</table>"
+    return f"<table class='rows'><tr>{top}</tr>{body}</table>"

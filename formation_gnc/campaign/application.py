@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from formation_gnc.campaign.case import (
+    addresses,
     check_dispersions,
     draw,
     fault_entries,
@@ -93,13 +94,14 @@ def _check(campaign: Campaign, words: str, dispersion: str, fault: str) -> None:
 
 def _pairs(campaign: Campaign, dispersion: str, fault: str) -> Iterator[tuple[int, int]]:
     """Pairs of cases with different draws, those furthest apart first."""
-    scenario = nominal_scenario(campaign, campaign.configurations[0])
-    values: dict[int, Any] = {}
-    for case in range(min(campaign.runs, LOOKED_AT)):
-        if dispersion:
-            values[case] = next(iter(draw(campaign, case, scenario)[dispersion].values()))
-        else:
-            values[case] = fault_entries(campaign, case).get(fault, "")
+    cases = range(min(campaign.runs, LOOKED_AT))
+    if dispersion:
+        meant = next(each for each in campaign.dispersions if each.name == dispersion)
+        scenario = nominal_scenario(campaign, campaign.configurations[0])
+        _, _, base = next(addresses(meant, scenario))
+        values = {case: meant.value(campaign.seed, case, base) for case in cases}
+    else:
+        values = {case: fault_entries(campaign, case).get(fault, "") for case in cases}
     order = sorted(values, key=lambda case: (repr(type(values[case])), values[case]))
     for one, other in zip(order, reversed(order), strict=True):
         if values[one] == values[other]:

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 from formation_gnc.campaign.definition import Campaign, Configuration
@@ -39,8 +38,8 @@ def seed_of(campaign: Campaign, case: int) -> int:
 
 
 @lru_cache(maxsize=64)
-def _nominal(scenario: Path, configuration: Configuration) -> Scenario:
-    return load_scenario(str(scenario), configuration.overrides)
+def _nominal(configuration: Configuration) -> Scenario:
+    return load_scenario(str(configuration.scenario), configuration.overrides)
 
 
 def nominal_scenario(campaign: Campaign, configuration: Configuration) -> Scenario:
@@ -50,7 +49,7 @@ def nominal_scenario(campaign: Campaign, configuration: Configuration) -> Scenar
         ConfigurationError: the configuration cannot be flown.
     """
     try:
-        return _nominal(campaign.scenario, configuration)
+        return _nominal(configuration)
     except ConfigurationError as error:
         raise ConfigurationError(f"{configuration.name}: {error}") from None
 
@@ -119,7 +118,7 @@ def with_values(
     scenario = nominal_scenario(campaign, configuration)
     if shared:
         given = {**configuration.overrides, "/**": {**configuration.overrides.get("/**", {}), **shared}}
-        scenario = load_scenario(str(campaign.scenario), given)
+        scenario = load_scenario(str(configuration.scenario), given)
 
     def own(node: str) -> dict[str, Any]:
         return {name: value for (place, name), value in values.items() if place == node and name not in shared}

@@ -1,6 +1,6 @@
 """Results of a campaign on disk: a Parquet data set in parts, each written whole by the worker that flew it.
 
-A directory of results has the campaign's file, its scenario, `campaign.json` (what and which software), and
+A directory of results has the campaign's file, its scenarios, `campaign.json` (what and which software), and
 
 - `cases/`: a row for each case and configuration: figures, drawn values, seed, reason of a failure, version;
 - `errors/`: errors over time in the Hill frame, thinned, a row for each case, configuration and deputy;
@@ -60,13 +60,14 @@ class Dataset:
             ) from None
 
     def create(self, campaign: Campaign, version: str, commit: str, block: int) -> None:
-        """Make the directory, with copies of the campaign's file and its scenario."""
+        """Make the directory, with copies of the campaign's file and its scenarios."""
         for name in (CASES, ERRORS, TIMING):
             (self.directory / name).mkdir(parents=True, exist_ok=True)
-        scenario = f"{campaign.scenario.stem}.yaml"
-        names = {"scenario": f"scenario/{scenario}", "campaign": f"{campaign.name}.yaml"}
-        (self.directory / "scenario").mkdir(exist_ok=True)
-        shutil.copyfile(campaign.scenario, self.directory / names["scenario"])
+        names = {"scenario": "scenario", "campaign": f"{campaign.name}.yaml"}
+        for name, path in campaign.copied().items():
+            copy = self.directory / names["scenario"] / name
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(path, copy)
         (self.directory / names["campaign"]).write_text(campaign.text, encoding="utf-8")
         manifest = {"identity": campaign.identity, "version": version, "commit": commit, "block": block, **names}
         _replace(self.directory / MANIFEST, lambda path: path.write_text(json.dumps(manifest, indent=2) + "\n"))

@@ -19,9 +19,12 @@ from formation_gnc.plain_file import read_plain
 from formation_gnc.randomness import generator
 from formation_gnc.shipped import find_shipped
 from formation_gnc.sil.overrides import address_of
-from formation_gnc.sil.scenario import find_scenario, load_scenario
+from formation_gnc.sil.scenario import extended, find_scenario, load_scenario
 
-KEYS = ("scenario", "seed", "runs", "set", "dispersions", "faults", "variants", "sweep", "requirements")
+SCENARIO = "scenario"
+"""Key of the scenario, of the campaign or of a variant that flies another one."""
+
+KEYS = (SCENARIO, "seed", "runs", "set", "dispersions", "faults", "variants", "sweep", "requirements")
 
 SWEEPS = ("grid", "latin_hypercube")
 
@@ -40,6 +43,7 @@ class Configuration:
     """
 
     name: str
+    scenario: Path
     overrides: Overrides
 
 
@@ -50,7 +54,7 @@ class Campaign:
     Attributes:
         name: of its file.
         text: of its file.
-        scenario: file of its scenario.
+        scenarios: their files, each once, in the order of the configurations.
         seed: of all that is drawn.
         runs: cases.
         configurations: flown on every case.
@@ -61,7 +65,7 @@ class Campaign:
 
     name: str
     text: str
-    scenario: Path
+    scenarios: tuple[Path, ...]
     seed: int
     runs: int
     configurations: tuple[Configuration, ...]
@@ -72,7 +76,26 @@ class Campaign:
     @property
     def identity(self) -> str:
         """Digest of all that decides on the flights besides the software, but not of how many there are."""
-        return sha256(f"{self.text}\n{self.seed}\n{self.scenario.read_text()}".encode()).hexdigest()
+        scenarios = "\n".join(path.read_text() for each in self.scenarios for path in extended(each))
+        return sha256(f"{self.text}\n{self.seed}\n{scenarios}".encode()).hexdigest()
+
+    def copied(self) -> dict[str, Path]:
+        """Files of the scenarios, with those beside them that they extend, by path in a directory of copies.
+
+        Raises:
+            ConfigurationError: two have the same name, or one extends a file further up.
+        """
+        files: dict[str, Path] = {}
+        for scenario in self.scenarios:
+            for path in extended(scenario):
+                if not path.is_relative_to(scenario.parent):
+                    continue  # shipped, and found by its name
+                name = f"{scenario.stem}.yaml" if path == scenario else str(path.relative_to(scenario.parent))
+                if ".." in Path(name).parts:
+                    raise ConfigurationError(f"scenario {scenario}: extends a file further up; put it beside it")
+                if files.setdefault(name, path) != path:
+                    raise ConfigurationError(f"scenarios {files[name]} and {path}: have the same name")
+        return files
 
     @property
     def within(self) -> tuple[float, ...]:
@@ -86,13 +109,13 @@ def find_campaign(name: str) -> Path:
     return find_shipped(name, "campaign", "campaigns", "a file")
 
 
-def load_campaign(path: Path, runs: int | None = None, scenario: Path | None = None) -> Campaign:
+def load_campaign(path: Path, runs: int | None = None, copies: Path | None = None) -> Campaign:
     """Read and check a campaign.
 
     Args:
         path: of its file.
         runs: cases in place of the file's.
-        scenario: file in place of the one that it names, a copy of it.
+        copies: directory with copies of the scenarios, in place of those that it names.
 
     Raises:
         ConfigurationError: the file cannot be read, is no campaign, or says what is not allowed.
@@ -110,13 +133,13 @@ def load_campaign(path: Path, runs: int | None = None, scenario: Path | None = N
     except (yaml.YAMLError, ValueError) as error:
         raise ConfigurationError(f"{path}: not YAML ({' '.join(str(error).split())})") from None
     try:
-        return _campaign(path, text, document, runs, scenario)
+        return _campaign(path, text, document, runs, copies)
     except ConfigurationError as error:
         raise ConfigurationError(f"{path.name}: {error}") from None
 
 
-def _campaign(path: Path, text: str, document: Any, runs: int | None, scenario: Path | None) -> Campaign:
-    if not isinstance(document, dict) or not isinstance(document.get("scenario"), str):
+def _campaign(path: Path, text: str, document: Any, runs: int | None, copies: Path | None) -> Campaign:
+    if not isinstance(document, dict) or not (SCENARIO in document or "variants" in document):
         raise ConfigurationError(f"is no campaign; it must have a scenario, and may have {', '.join(KEYS[1:])}")
     for key in document:
         if key not in KEYS:
@@ -126,20 +149,22 @@ def _campaign(path: Path, text: str, document: Any, runs: int | None, scenario: 
             raise ConfigurationError(
                 f"{key}: {document[key]!r} is not allowed; it must map names to what they are given"
             )
-    if scenario is None:
-        name = document["scenario"]
-        scenario = find_scenario(str(path.parent / name) if name.endswith((".yaml", ".yml")) else name)
     dispersions = tuple(dispersion_of(name, spec) for name, spec in document.get("dispersions", {}).items())
     faults = tuple(fault_of(name, spec) for name, spec in document.get("faults", {}).items())
     seed = _whole("seed", document.get("seed", 1), 0)
-    configurations = tuple(_configurations(document, seed))
-    deputies = load_scenario(str(scenario.absolute()), configurations[0].overrides).plant.deputies
+    configurations = tuple(_configurations(document, seed, path.parent, copies))
+    scenarios = tuple(dict.fromkeys(each.scenario for each in configurations))
+    # a requirement may name a deputy that all configurations have
+    fleets = [load_scenario(str(each.scenario), each.overrides).plant.deputies for each in configurations]
+    deputies = [name for name in fleets[0] if all(name in fleet for fleet in fleets)]
     statements = document.get("requirements", [])
     if not isinstance(statements, list):
         raise ConfigurationError(f"requirements: {statements!r} is not allowed; it must be a list of statements")
     requirements = tuple(requirement_of(each, deputies) for each in statements)
     runs = _whole("runs", document.get("runs", 852) if runs is None else runs, 1)
-    return Campaign(path.stem, text, scenario.absolute(), seed, runs, configurations, dispersions, faults, requirements)
+    campaign = Campaign(path.stem, text, scenarios, seed, runs, configurations, dispersions, faults, requirements)
+    campaign.copied()
+    return campaign
 
 
 def _whole(name: str, value: Any, least: int) -> int:
@@ -148,19 +173,35 @@ def _whole(name: str, value: Any, least: int) -> int:
     return value
 
 
-def _configurations(document: Mapping[str, Any], seed: int) -> Iterator[Configuration]:
+def _configurations(
+    document: Mapping[str, Any], seed: int, beside: Path, copies: Path | None
+) -> Iterator[Configuration]:
     """Every variant at every point of the sweep."""
     base = _overrides("set", document.get("set", {}))
     variants: dict[str, Any] = document.get("variants", {}) or {"": {}}
     points = list(_points(document.get("sweep", {}), seed)) or [{}]
     for name, values in variants.items():
-        own = _overrides(f"variant {name}", values)
+        given = dict(values) if isinstance(values, dict) else values
+        flown = given.pop(SCENARIO, None) if isinstance(given, dict) else None
+        scenario = _scenario(document.get(SCENARIO) if flown is None else flown, name, beside, copies)
+        own = _overrides(f"variant {name}", given)
         for point in points:
             words = [name] if name else []
             words += [
                 f"{parameter}={value if isinstance(value, str) else f'{value:g}'}" for parameter, value in point.items()
             ]
-            yield Configuration(", ".join(words) or NOMINAL, _merged(base, own, _overrides("sweep", point)))
+            yield Configuration(", ".join(words) or NOMINAL, scenario, _merged(base, own, _overrides("sweep", point)))
+
+
+def _scenario(name: Any, variant: str, beside: Path, copies: Path | None) -> Path:
+    """File of a scenario given by name, or by its path from the campaign's own directory."""
+    if not isinstance(name, str):
+        raise ConfigurationError(
+            f"{f'variant {variant}: ' if variant else ''}scenario: {name!r} is not allowed; it must be a name or a file"
+        )
+    if copies is not None:
+        return (copies / f"{Path(name).stem}.yaml").absolute()
+    return find_scenario(str(beside / name) if name.endswith((".yaml", ".yml")) else name).absolute()
 
 
 def _overrides(source: str, values: Any) -> Overrides:

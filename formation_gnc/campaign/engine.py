@@ -103,10 +103,12 @@ def _client(cluster: Cluster) -> Iterator[Any]:
             return
         dashboard = ":0" if find_spec("bokeh") else None
         options = {"threads_per_worker": 1, "memory_limit": 0, "silence_logs": logging.CRITICAL}
-        with (
-            LocalCluster(cluster.workers, dashboard_address=dashboard, **options) as local,
-            Client(local, set_as_default=False) as client,
-        ):
+        try:
+            local = LocalCluster(cluster.workers, dashboard_address=dashboard, **options)
+        except (OSError, RuntimeError) as error:  # a machine too busy to start them in time, or without room for more
+            reason = " ".join(str(error).split()) or type(error).__name__
+            raise CampaignError(f"workers cannot be started ({reason})") from None
+        with local, Client(local, set_as_default=False) as client:
             yield client
 
 

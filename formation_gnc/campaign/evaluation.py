@@ -1,6 +1,5 @@
 """What a campaign's data set says: verdicts, dispersions that were not applied, what hurts, paired differences."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import nan, sqrt
 from pathlib import Path
@@ -8,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from formation_gnc.campaign.case import CASE, REASON
+from formation_gnc.campaign.case import CASE, REASON, nominal_scenario
 from formation_gnc.campaign.dataset import Dataset
 from formation_gnc.campaign.definition import Campaign
 from formation_gnc.campaign.flight_figures import BANDS, NUMBERS, OF_RUN, band
@@ -67,9 +66,8 @@ class Flights:
         """Read nothing yet."""
         self.campaign, self.results = campaign, results
         self.names = results.names()
-        self.deputies = list(
-            dict.fromkeys(name.rpartition(".")[0] for name in self.names if name.endswith(".final_error_m"))
-        )
+        self.deputies = {each.name: nominal_scenario(campaign, each).plant.deputies for each in campaign.configurations}
+        """By configuration."""
 
     def column(self, name: str, configuration: str) -> Values:
         """A column of one configuration; NaN where it has no value."""
@@ -85,18 +83,17 @@ class Flights:
             configuration: its name.
             upper: whether large values are bad.
         """
-        columns = self._columns(name)
+        columns = self._columns(name, configuration)
         found = [self.column(each, configuration) for each in columns]
-        if not found:
-            return self.column(name, configuration)
         both = np.array([each.values for each in found])
         missing = np.isnan(both).any(axis=0)
         worst = both.max(axis=0, initial=-np.inf) if upper else both.min(axis=0, initial=np.inf)
         return Values(found[0].cases, np.where(missing, nan, worst), found[0].reasons)
 
-    def _columns(self, name: str) -> list[str]:
-        own = name in OF_RUN or name.partition(".")[0] in self.deputies
-        return [name] if own else [f"{deputy}.{name}" for deputy in self.deputies]
+    def _columns(self, name: str, configuration: str) -> list[str]:
+        deputies = self.deputies[configuration]
+        own = name in OF_RUN or name.partition(".")[0] in deputies
+        return [name] if own else [f"{deputy}.{name}" for deputy in deputies]
 
     def outcomes(self) -> list[Outcome]:
         """Verdict on every requirement in every configuration."""
@@ -137,7 +134,7 @@ class Flights:
     def _outside(self, name: str, configuration: str) -> Values:
         """How far each flight is outside the band of a figure, of the deputy which is furthest; 0 inside."""
         worst: Values | None = None
-        for column in self._columns(name):
+        for column in self._columns(name, configuration):
             ratio, freedom = self._with_freedom(column, configuration)
             bounds = np.array([band(each) if each > 0.0 else (nan, nan) for each in freedom.values]).reshape(-1, 2)
             beyond = np.maximum(np.maximum(bounds[:, 0] - ratio.values, ratio.values - bounds[:, 1]), 0.0)
@@ -155,7 +152,7 @@ class Flights:
         from scipy.stats import chi2
 
         total, freedom, runs, lost = 0.0, 0.0, 0, 0
-        for column in self._columns(requirement.figure):
+        for column in self._columns(requirement.figure, configuration):
             ratio, weight = self._with_freedom(column, configuration)
             good = ~np.isnan(ratio.values * weight.values)
             total += float(ratio.values[good] @ weight.values[good])
@@ -254,22 +251,28 @@ class Difference:
 
 def differences(flights: Flights, figure: str, upper: bool = True) -> list[Difference]:
     """Paired differences of a figure to the first configuration."""
+    first, *others = (each.name for each in flights.campaign.configurations)
+    found = (difference(flights, figure, name, first, upper) for name in others)
+    return [each for each in found if each is not None]
+
+
+def difference(
+    flights: Flights, figure: str, configuration: str, reference: str, upper: bool = True
+) -> Difference | None:
+    """Paired difference of a figure between two configurations; None with fewer than two pairs."""
     from scipy.stats import t
 
-    names: Sequence[str] = [each.name for each in flights.campaign.configurations]
-    reference = flights.figure(figure, names[0], upper)
-    found = []
-    for name in names[1:]:
-        own = flights.figure(figure, name, upper)
-        common, here, there = np.intersect1d(reference.cases, own.cases, return_indices=True)
-        pairs = own.values[there] - reference.values[here]
-        pairs = pairs[np.isfinite(pairs)]
-        if len(common) and len(pairs) > 1:
-            mean = float(pairs.mean())
-            half = float(t.ppf(0.975, len(pairs) - 1)) * float(pairs.std(ddof=1)) / sqrt(len(pairs))
-            better = float(np.mean(pairs < 0.0))
-            found.append(Difference(name, names[0], figure, mean, mean - half, mean + half, better, len(pairs)))
-    return found
+    one, other = (flights.figure(figure, name, upper) for name in (configuration, reference))
+    _, here, there = np.intersect1d(one.cases, other.cases, return_indices=True)
+    pairs = one.values[here] - other.values[there]
+    pairs = pairs[np.isfinite(pairs)]
+    if len(pairs) < 2:
+        return None
+    mean = float(pairs.mean())
+    half = float(t.ppf(0.975, len(pairs) - 1)) * float(pairs.std(ddof=1)) / sqrt(len(pairs))
+    return Difference(
+        configuration, reference, figure, mean, mean - half, mean + half, float(np.mean(pairs < 0.0)), len(pairs)
+    )
 
 
 def departing_figures(results: Dataset, case: int, configuration: str, bag: Path) -> list[str] | None:

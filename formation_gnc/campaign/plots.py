@@ -44,7 +44,7 @@ def distribution(flights: Flights, requirement: Requirement) -> Plot:
         edge = Style(style.colour, line="dotted", width=0.7)
         curves.append(Curve(configuration.name, ordered[rows], share, style))
         for bound in (np.clip(share - half, 0.0, 100.0), np.clip(share + half, 0.0, 100.0)):
-            curves.append(Curve(f"{configuration.name}, {100 * CONFIDENCE:g} % band", ordered[rows], bound, edge))
+            curves.append(Curve(configuration.name, ordered[rows], bound, edge))
     if isfinite(requirement.limit):
         limit = np.full(2, requirement.limit)
         curves.append(Curve("limit", limit, np.array([0.0, 100.0]), Style(RED, line="dashed")))
@@ -56,7 +56,8 @@ def errors_over_time(flights: Flights, configuration: str, deputy: str) -> list[
     names = ["deputy", *AXES]
     found = flights.results.table(names, ERRORS, min(flights.campaign.runs, CURVES), configuration)
     rows = [number for number, name in enumerate(found["deputy"].to_pylist()) if name == deputy]
-    plant = nominal_scenario(flights.campaign, flights.campaign.configurations[0]).plant
+    meant = next(each for each in flights.campaign.configurations if each.name == configuration)
+    plant = nominal_scenario(flights.campaign, meant).plant
     time = curve_ticks(plant.ticks) * plant.tick / 3600.0
     plots = []
     for number, axis in enumerate(AXES):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from formation_gnc.analysis.overview import draw_column
-from formation_gnc.analysis.page import section, table, table_of, write_page
+from formation_gnc.analysis.page import section, side_by_side, table, table_of, write_page
 from formation_gnc.analysis.plot import Plot
 from formation_gnc.analysis.plotly_renderer import draw_columns
 from formation_gnc.analysis.timeline import Timeline
@@ -89,14 +89,21 @@ def write_report(flights: Flights, outcomes: Sequence[Outcome], path: Path) -> P
     pictures = path.parent / "pictures"
     pictures.mkdir(exist_ok=True)
     sections, drawn = [f"<h2>Summary</h2>{table(_summary(flights))}", _verdicts(outcomes)], 0
-    for heading, below, columns in _parts(flights):
-        plots = [plot for column in columns for plot in column]
+    for heading, below, plots in _parts(flights):
         if any(len(curve.x) for plot in plots for curve in plot.curves):
-            figure, drawn = draw_columns(columns, Timeline((), (), {})), drawn + 1
-            sections.append(section(heading, figure) + below)
+            drawn += 1
+            sections.append(_drawn(heading, plots) + below)
             draw_column(plots, pictures / f"{drawn:02d}_{_file_name(heading)}.png")
     sections += [_differences(flights), _worst(flights), _failed(flights)]
     return write_page(path, f"Campaign {flights.campaign.name}", sections)
+
+
+def _drawn(heading: str, plots: Sequence[Plot]) -> str:
+    """Plots over time in one figure; all others in one each, side by side where there is room."""
+    if all(plot.over_time for plot in plots) or len(plots) == 1:
+        return section(heading, draw_columns([plots], Timeline((), (), {})))
+    figures = (section(plot.title, draw_columns([[plot]], Timeline((), (), {}))) for plot in plots)
+    return f"<h2>{escape(heading)}</h2>{side_by_side(figures)}"
 
 
 def _file_name(heading: str) -> str:
@@ -107,7 +114,7 @@ def _summary(flights: Flights) -> dict[str, Any]:
     campaign, manifest = flights.campaign, flights.results.manifest
     wall = [each for each in flights.results.table(["wall_time_s"], TIMING)["wall_time_s"].to_pylist() if each]
     rows: dict[str, Any] = {
-        "scenario": campaign.scenario.stem,
+        "scenario": ", ".join(each.stem for each in campaign.scenarios),
         "cases": campaign.runs,
         "configurations": ", ".join(each.name for each in campaign.configurations),
         "seed": campaign.seed,
@@ -122,16 +129,19 @@ def _summary(flights: Flights) -> dict[str, Any]:
 
 
 def _verdicts(outcomes: Sequence[Outcome]) -> str:
-    head = "".join(f"<th>{escape(each)}</th>" for each in OUTCOME_HEAD)
+    several = len({each.configuration for each in outcomes}) > 1
+    shown = [number for number, name in enumerate(OUTCOME_HEAD) if several or name != "configuration"]
+    head = "".join(f"<th>{escape(OUTCOME_HEAD[number])}</th>" for number in shown)
     rows = ""
     for outcome in outcomes:
-        cells = "".join(f"<td>{escape(each)}</td>" for each in outcome_row(outcome))
+        row = outcome_row(outcome)
+        cells = "".join(f"<td>{escape(row[number])}</td>" for number in shown)
         rows += f"<tr class='{_CLASSES[outcome.verdict]}'>{cells}</tr>"
     explained = (
         "<p>Bound: what the required share of all flights keeps with the confidence, by order statistics; for a mean, "
         "the mean. Margin: from there to the limit. Runs needed: with which the requirement is met if no more fail.</p>"
     )
-    return f"<h2>Verdicts</h2><table><tr>{head}</tr>{rows}</table>{explained}" if outcomes else ""
+    return f"<h2>Verdicts</h2><table class='rows'><tr>{head}</tr>{rows}</table>{explained}" if outcomes else ""
 
 
 def _figures_of(flights: Flights) -> list[Requirement]:
@@ -139,31 +149,27 @@ def _figures_of(flights: Flights) -> list[Requirement]:
     return list({each.figure: each for each in flights.campaign.requirements if not each.of_mean}.values())
 
 
-def _parts(flights: Flights) -> Iterator[tuple[str, str, list[list[Plot]]]]:
-    """Heading, what is below the plots, and the plots in columns."""
+def _parts(flights: Flights) -> Iterator[tuple[str, str, list[Plot]]]:
+    """Heading, what is below the plots, and the plots."""
     asked, campaign = _figures_of(flights), flights.campaign
     plots = [distribution(flights, each) for each in asked]
     if plots:
-        yield "Distributions", "<p>Share of the flights below a value, with its 95 % band.</p>", _in_two(plots)
+        yield "Distributions", "<p>Share of the flights below a value; dotted, its 95 % band.</p>", plots
     for configuration in campaign.configurations[:OVER_TIME]:
-        for deputy in flights.deputies:
+        for deputy in flights.deputies[configuration.name]:
             words = f"Error over time: {deputy}" + ("" if configuration.name == NOMINAL else f", {configuration.name}")
-            yield words, "", [errors_over_time(flights, configuration.name, deputy)]
+            yield words, "", errors_over_time(flights, configuration.name, deputy)
     first = campaign.configurations[0].name
     for requirement in asked:
         found = correlations(flights, requirement.figure, first, not requirement.relation.startswith(">"))
         rows = [(each.drawn, f"{each.rank:+.3f}", f"{each.chance:.2g}") for each in found[:STRONGEST]]
         listed = table_of(("drawn value", "rank correlation", "probability by chance"), rows)
         words = f"What hurts: {requirement.figure}" + ("" if first == NOMINAL else f", {first}")
-        yield words, listed, _in_two(scatters(flights, requirement, first, found[:DRAWN]))
+        yield words, listed, scatters(flights, requirement, first, found[:DRAWN])
     for requirement in asked:
         pairs = differences(flights, requirement.figure, not requirement.relation.startswith(">"))
         if pairs:
-            yield f"Paired: {requirement.figure}", "", [[_interval_plot(pairs)]]
-
-
-def _in_two(plots: list[Plot]) -> list[list[Plot]]:
-    return [plots[::2], plots[1::2]] if len(plots) > 1 else [plots]
+            yield f"Paired: {requirement.figure}", "", [_interval_plot(pairs)]
 
 
 def _interval_plot(pairs: Sequence[Difference]) -> Plot:
@@ -192,7 +198,7 @@ def _differences(flights: Flights) -> str:
 
 
 def _worst(flights: Flights) -> str:
-    rows = []
+    rows, several = list[tuple[Any, ...]](), len(flights.campaign.configurations) > 1
     for requirement in _figures_of(flights):
         upper = not requirement.relation.startswith(">")
         for configuration in flights.campaign.configurations:
@@ -202,10 +208,10 @@ def _worst(flights: Flights) -> str:
                 case = int(figure.cases[row])
                 shown = number(float(figure.values[row])) if not figure.reasons[row] else figure.reasons[row]
                 again = command_of(flights, case, configuration.name)
-                rows.append((requirement.figure, configuration.name, case, shown, again))
+                rows.append((requirement.figure, *([configuration.name] if several else []), case, shown, again))
     if not rows:
         return ""
-    head = ("figure", "configuration", "case", "value", "flown again by")
+    head = ("figure", *(["configuration"] if several else []), "case", "value", "flown again by")
     return f"<h2>Worst cases</h2>{table_of(head, rows)}"
 
 

@@ -178,7 +178,7 @@ def _summarise(flights: "Flights", elapsed: float, as_json: bool) -> int:
             json.dumps(
                 {
                     "campaign": campaign.name,
-                    "scenario": campaign.scenario.stem,
+                    "scenario": ", ".join(each.stem for each in campaign.scenarios),
                     "runs": campaign.runs,
                     "seed": campaign.seed,
                     "configurations": [each.name for each in campaign.configurations],

@@ -156,7 +156,7 @@ def find_scenario(name: str) -> Path:
 def sources(name: str, overrides: Mapping[str, Mapping[str, Any]], node: str) -> dict[str, str]:
     """File or "command line" that each parameter of a node comes from, by dotted name; none for a default."""
     found: dict[str, str] = {}
-    for path in reversed(_extended(find_scenario(name))):
+    for path in reversed(extended(find_scenario(name))):
         for pattern, section in _read(path)[1]:
             if matches(pattern, node):
                 found |= dict.fromkeys(section, f"{path.stem} {pattern}")
@@ -237,11 +237,11 @@ def matches(pattern: str, node: str) -> bool:
 
 def _sections(path: Path) -> Sections:
     """Node patterns of a parameter file with their parameters by dotted name: those it extends, then its own."""
-    return [section for each in reversed(_extended(path)) for section in _read(each)[1]]
+    return [section for each in reversed(extended(path)) for section in _read(each)[1]]
 
 
-def _extended(path: Path) -> list[Path]:
-    """A scenario's file, the one that it extends, and so on."""
+def extended(path: Path) -> list[Path]:
+    """A scenario's file, the one that it extends, and so on; raises ConfigurationError for one that is not there."""
     chain = [path]
     while (base := _read(chain[-1])[0]) is not None:
         beside = chain[-1].parent / base

@@ -3,6 +3,7 @@
 import pytest
 
 from formation_gnc.campaign.case import check_dispersions, draw, nominal_scenario, scenario_of, seed_of
+from formation_gnc.campaign.dataset import Dataset
 from formation_gnc.campaign.definition import find_campaign, load_campaign
 from formation_gnc.errors import ConfigurationError
 
@@ -127,3 +128,30 @@ def test_shipped_campaign_can_be_flown(path):
     for configuration in campaign.configurations:
         check_dispersions(campaign, configuration)
         scenario_of(campaign, 0, configuration)
+
+
+def test_variants_may_fly_scenarios_of_their_own(write, tmp_path):
+    text = "runs: 2\nvariants: {a: {scenario: leader_follower, plant.tick: 10.0}, b: {scenario: tetrahedral}}\n"
+    text += "requirements: [deputy1.final_error_m < 9.0 in 60 % at 60 % confidence]"
+    campaign = load_campaign(write(text))
+    assert [len(scenario_of(campaign, 0, each).plant.deputies) for each in campaign.configurations] == [1, 4]
+    assert [each.stem for each in campaign.scenarios] == ["leader_follower", "tetrahedral"]
+    assert "variant c: scenario: None is not allowed" in refusal(write("variants: {c: {plant.tick: 10.0}}"))
+    assert "deputy2" in refusal(write(text.replace("deputy1", "deputy2")))
+
+
+def test_results_have_copies_of_what_a_scenario_extends(write, tmp_path):
+    write("extends: leader_follower\n/plant: {ros__parameters: {duration: 600.0}}", "base.yaml")
+    mine = write("extends: base.yaml\n/plant: {ros__parameters: {seed: 5}}", "mine.yml")
+    campaign, results = load_campaign(write("scenario: mine.yml")), Dataset(tmp_path / "results")
+    results.create(campaign, "1", "", 1)
+    base = mine.with_name("base.yaml")
+    identity, content = campaign.identity, base.read_text()
+    base.write_text(content.replace("600", "900"))
+    assert campaign.identity != identity
+    base.write_text(content)
+    mine.unlink()
+    base.unlink()
+    copied = results.campaign()
+    assert copied.identity == identity
+    assert scenario_of(copied, 0, copied.configurations[0]).plant.duration == 600.0

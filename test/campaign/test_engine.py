@@ -129,7 +129,8 @@ def test_killed_worker_leaves_no_hole(file, cluster, flown_alone, tmp_path, monk
     assert same(Dataset(out), flown_alone)
 
 
-def test_killed_client_goes_on_with_what_is_done(file, cluster, flown_alone, tmp_path, capsys):
+@pytest.mark.parametrize("killed_by", [signal.SIGTERM, signal.SIGKILL])
+def test_killed_client_goes_on_with_what_is_done(killed_by, file, cluster, flown_alone, tmp_path, capsys):
     out = tmp_path / "results"
     words = ["campaign", str(file), "--runs", str(RUNS), "--scheduler-file", str(cluster.file), "--out", str(out)]
     code = (
@@ -138,11 +139,12 @@ def test_killed_client_goes_on_with_what_is_done(file, cluster, flown_alone, tmp
     )
     client = subprocess.Popen([sys.executable, "-c", code, *words], stderr=subprocess.PIPE, text=True)
     wait_until(lambda: parts(out) >= 1, "a part")
-    os.kill(client.pid, signal.SIGTERM)
+    os.kill(client.pid, killed_by)
     error = client.communicate(timeout=PATIENCE)[1]
-    assert client.returncode == 130
-    assert f"of {RUNS} cases kept in {out}, --resume goes on" in error
-    assert len(error.splitlines()) == 1
+    if killed_by == signal.SIGTERM:
+        assert client.returncode == 130
+        assert f"of {RUNS} cases kept in {out}, --resume goes on" in error
+        assert len(error.splitlines()) == 1
     assert 1 <= parts(out) < RUNS
     assert fly(file, cluster, out) == 2
     assert "exist already; --resume goes on" in capsys.readouterr().err
@@ -178,3 +180,13 @@ def test_scheduler_that_does_not_answer_is_named(file, tmp_path, monkeypatch, ca
     assert main(words) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("formation-gnc: scheduler tcp://127.0.0.1:9: cannot be reached")
+
+
+def test_workers_that_do_not_start_are_told_in_one_line(file, tmp_path, monkeypatch, capsys):
+    def late(*_, **__):
+        raise TimeoutError
+
+    monkeypatch.setattr("distributed.LocalCluster", late)
+    assert main(["campaign", str(file), "--out", str(tmp_path / "results")]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("formation-gnc: workers cannot be started (TimeoutError); 0 of 6 cases kept")
