@@ -246,7 +246,7 @@ def test_a_node_that_dies_ends_the_run_and_is_named(sil: StartSil, victim: str) 
 
 
 def test_a_node_that_dies_is_started_again_where_asked(sil: StartSil) -> None:
-    run = sil("--respawn", "--real-time-factor", "20", "--duration", "300")
+    run = sil("--respawn", "--real-time-factor", "40", "--duration", "300")
     wait_until(lambda: has_messages(run.bag, "/deputy1/target"), "the first target on disk")
     os.kill(run.children()["guidance"], signal.SIGKILL)
     status, _, errors = run.finish()
