@@ -27,7 +27,6 @@ from formation_gnc.types import NANOSECONDS, Matrix, Vector
 LONGEST_BURN = 1.0 / 6.0
 """Of a burn, in revolutions: one of that length has 95 % of the effect of an impulse. The next plan does the rest."""
 
-
 WORTH = 1e-2
 """Share of a plan's delta-v below which an impulse waits for a later plan: else it would stand before a large one."""
 

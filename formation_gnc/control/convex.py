@@ -1,7 +1,7 @@
 """Finite-thrust trajectories by second-order cone programmes."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from formation_gnc.common import CommonParameters
 from formation_gnc.control.cone_programme import ConeError, ConeProgramme
 from formation_gnc.control.controller import Command, Controller, Handover, Vehicle
 from formation_gnc.control.models import CLOSED_FORM_MODELS, check_along_track
-from formation_gnc.control.mpc_constraints import in_eclipse
+from formation_gnc.control.mpc_constraints import meets
 from formation_gnc.control.path_constraints import TOLERANCE, ApproachCone, KeepOut, Path, PathConstraint, SpeedLimit
 from formation_gnc.control.plan import Plan, held_over_tick
 from formation_gnc.control.target_prediction import has_jumped
@@ -271,12 +271,10 @@ class Convex(Controller[ConvexParameters]):
 
     def _is_off(self, time: int, step: int, steps: int, target: Target) -> NDArray[np.bool_]:
         """(steps,) whether there is no thrust in each step (ns) from a time."""
-        off = in_eclipse(time, step, steps, replace(target, eclipses=self._windows))
+        windows = self._windows
         if self._parameters.off_in_eclipse:
-            off = off | in_eclipse(
-                time, step, steps, replace(target, eclipses=self._eclipses(time + step * steps, target))
-            )
-        return off
+            windows = np.vstack([windows, self._eclipses(time + step * steps, target)])
+        return meets(time, step, steps, windows)
 
     def _eclipses(self, end: int, target: Target) -> NDArray[np.int64]:
         """(N, 2) eclipses until a time: those predicted, and the last of them in every revolution after."""

@@ -101,7 +101,7 @@ class ThrustBox(Constraint):
         """The box, closed in the steps in eclipse."""
         box = self._box
         if self._off_in_eclipse:
-            dark = in_eclipse(inputs.estimate.time, self._step, self._steps, inputs.target)
+            dark = meets(inputs.estimate.time, self._step, self._steps, inputs.target.eclipses)
             largest = np.full((self._steps, 3), np.inf)
             largest[dark] = 0.0 if self._rate is None else self._ramp(self._rate, inputs)[dark]
             box = np.minimum(box, largest.ravel())
@@ -121,7 +121,7 @@ class ThrustBox(Constraint):
 
     def clip(self, force: Vector, time: int, target: Target) -> Vector:
         """Zero in eclipse."""
-        if self._off_in_eclipse and in_eclipse(time, self._tick, 1, target).any():
+        if self._off_in_eclipse and meets(time, self._tick, 1, target.eclipses).any():
             return np.zeros(3)
         return force
 
@@ -258,12 +258,12 @@ class KeepOutSpheres(Constraint):
         return Bounds(lower, upper, coefficients)
 
 
-def in_eclipse(time: int, step: int, steps: int, target: Target) -> NDArray[np.bool_]:
-    """(steps,) whether any part of each step (ns) from a time (ns) lies in an eclipse that the target predicts."""
+def meets(time: int, step: int, steps: int, intervals: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(steps,) whether any part of each step (ns) from a time (ns) lies in any of intervals (N, 2), as of eclipses."""
     begin = time + step * np.arange(steps)[:, None]
     end = begin + step
-    dark: NDArray[np.bool_] = np.any((begin < target.eclipses[:, 1]) & (end > target.eclipses[:, 0]), axis=1)
-    return dark
+    met: NDArray[np.bool_] = np.any((begin < intervals[:, 1]) & (end > intervals[:, 0]), axis=1)
+    return met
 
 
 @cache

@@ -43,7 +43,6 @@ EXACT = 1e-7
 ENOUGH = 1e-4
 """Largest excess of the primer vector over one that is not worth another time."""
 
-
 TOGETHER = 500.0
 """Share of a revolution within which impulses are one: neighbours of the last times, between which the best is."""
 
