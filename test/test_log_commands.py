@@ -226,7 +226,8 @@ def rewritten(
         if timings:
             writer.add_topic("/deputy1/timing", "formation_gnc_msgs/msg/Timing", QUEUE_DEPTH)
         for timing in timings:
-            writer.write("/deputy1/timing", codec(Timing).encode(timing), timing.time, 2)
+            number = numbers.get(("/deputy1/timing", timing.time), 2)
+            writer.write("/deputy1/timing", codec(Timing).encode(timing), timing.time, number)
     return directory
 
 
@@ -307,6 +308,22 @@ def test_a_restarted_node_replays_with_its_recorded_parameters(
     wanted.write_text("/**/controller: {ros__parameters: {algorithm: hinf}}")
     _, again = replayed(tmp_path / "known", tmp_path / "other", "--nodes", "controller", "--params", str(wanted))
     assert set(again.arrays("/deputy1/status")["algorithm"].tolist()) == {"hinf"}
+
+
+@pytest.mark.thorough
+def test_a_restarted_node_replays_from_its_first_tick_answered_or_not(reference: Path, tmp_path: Path) -> None:
+    """Navigation that comes back between two fixes has finished a tick, and said so, before its first estimate."""
+    first, start, node = 49 * NANOSECONDS, 50 * NANOSECONDS, "/deputy1/controller"
+    ticks = Bag(reference).arrays("/deputy1/status")["stamp_ns"].tolist()
+    unanswered = {("/deputy1/thrust", first): 0, ("/deputy1/status", first): 0}
+    begun = {("/deputy1/timing", first): 1, ("/deputy1/thrust", start): 1}
+    values = Bag(reference).metadata[f"parameters {node}"] | {"algorithm": '"coast"'}
+    coast = {f"parameters {node} from {start}": values}
+    timings = [Timing(stamp, "controller", 100_000) for stamp in ticks]
+    bag = rewritten(Bag(reference), tmp_path / "bag", unanswered | begun, coast, timings)
+    _, again = replayed(bag, tmp_path / "again", "--nodes", "controller")
+    laws = again.arrays("/deputy1/status")["algorithm"].tolist()
+    assert laws == ["lqr"] * 49 + ["coast"] * (len(laws) - 49)
 
 
 @pytest.mark.thorough

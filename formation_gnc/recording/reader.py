@@ -1,7 +1,7 @@
 """Reading bags: raw messages in bounded memory, decoded messages, and whole topics as NumPy arrays."""
 
 import heapq
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from itertools import groupby
@@ -270,14 +270,17 @@ class Bag:
         for (stamp, topic), group in groupby(in_order(), key=itemgetter(0, 1)):
             yield stamp, topic, [data for _, _, data in group]
 
-    def restarts(self, topics: Sequence[str]) -> dict[str, set[int]]:
-        """Stamps (ns), by topic, of messages with which a publisher restarted its count."""
+    def restarts(
+        self, topics: Sequence[str], publisher: Callable[[str, bytes], str] = lambda topic, data: topic
+    ) -> dict[str, set[int]]:
+        """Stamps (ns) of messages with which a publisher (of topic and CDR bytes) restarted its count, by its name."""
         found: dict[str, set[int]] = {topic: set() for topic in topics}
-        latest: dict[str, int] = {}
+        heard: set[str] = set()
         for message in self._messages([topic for topic in topics if topic in self.topics]):
-            if message.sequence == 1 and message.topic in latest:
-                found[message.topic].add(message.stamp)
-            latest[message.topic] = message.sequence
+            name = publisher(message.topic, message.data)
+            if message.sequence == 1 and name in heard:
+                found.setdefault(name, set()).add(message.stamp)
+            heard.add(name)
         return found
 
     def definition(self, topic: str) -> tuple[Schema | None, Channel]:

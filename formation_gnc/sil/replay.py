@@ -43,7 +43,7 @@ class ReplayedModule:
         self.node, self.deputy = node, topics.deputy_of(node)
         self.row: Row = MODULES[_name(node)]
         self.restarts: dict[int, Any] = {}
-        """Parameters by the stamps of the first answers of processes that had been started again."""
+        """Parameters by the stamps of the first ticks of processes that had been started again."""
         self.answer, self.timing = self.row.answer.of(self.deputy), topics.TIMING.of(self.deputy)
         self.orphans = 0
         """Ticks whose input the bag lacks though it was answered."""
@@ -157,7 +157,7 @@ def replay(bag: Bag, parameters: Mapping[str, Mapping[str, Any]], decode: Decode
             modules.append(ReplayedModule(node, values, without))
         except ConfigurationError as error:
             raise ConfigurationError(f"{node}: {error}") from None
-    remarks = list(_note_restarts(bag, modules, parameters))
+    remarks = list(_note_restarts(bag, modules, parameters, decode))
     _Replay(bag, modules, decode, sink, copy).run()
     orphans = sum(module.orphans for module in modules)
     if orphans:
@@ -166,14 +166,17 @@ def replay(bag: Bag, parameters: Mapping[str, Mapping[str, Any]], decode: Decode
 
 
 def _note_restarts(
-    bag: Bag, modules: Sequence[ReplayedModule], parameters: Mapping[str, Mapping[str, Any]]
+    bag: Bag, modules: Sequence[ReplayedModule], parameters: Mapping[str, Mapping[str, Any]], decode: Decode
 ) -> Iterator[str]:
     """Tell every module when it is to start again, and with what; yields what the bag lacks for that."""
     restarts = bag.restarts([module.answer for module in modules])
+    timings = sorted({module.timing for module in modules})
+    first_ticks = bag.restarts(timings, lambda topic, data: _timed_node(topic, decode(topic, data)))
     for module in modules:
         recorded, latest = parameters_of(bag, module.node), module.parameters
         given = parameters[module.node]
         changes = {name: value for name, value in given.items() if value != recorded.get(name)}
+        before = -1
         for stamp in sorted(restarts[module.answer]):
             values = parameters_of(bag, module.node, stamp)
             if values:
@@ -183,7 +186,10 @@ def _note_restarts(
                     f"{module.node} was started again at {stamp / NANOSECONDS:g} s; the bag lacks with which "
                     "parameters, so it flies with those before"
                 )
-            module.restarts[stamp] = latest
+            # Its first ticks may have had no answer: navigation without a fix to start from.
+            own = [each for each in first_ticks.get(module.node, ()) if before < each <= stamp]
+            module.restarts[max(own, default=stamp)] = latest
+            before = stamp
 
 
 @dataclass
@@ -241,7 +247,7 @@ class _Replay:
             return True
         if _is_timing(topic):
             timing = self._decode(topic, data)
-            node = f"/{topics.deputy_of(topic)}/{timing.node if timing else ''}"
+            node = _timed_node(topic, timing)
             tick.timed[node] = timing.missing if timing else []
             return node in self._nodes
         return topic in self._outputs
@@ -319,3 +325,8 @@ def _name(node: str) -> str:
 
 def _is_timing(topic: str) -> bool:
     return topic == topics.TIMING.of(topics.deputy_of(topic))
+
+
+def _timed_node(topic: str, timing: Timing | None) -> str:
+    """Full name of the node that a timing is of."""
+    return f"/{topics.deputy_of(topic)}/{timing.node if timing else ''}"

@@ -22,7 +22,10 @@ from formation_gnc.transport.node import CHECK_PERIOD, ConfiguredNode, rejected
 from formation_gnc.types import NANOSECONDS
 
 SETTLING = 0.1
-"""Wall time (s) without another one after which a node that finds messages from before its start has all of them."""
+"""Wall time (s) without another one after which a node that comes into a flight going on has all that came before."""
+
+STALLED = 0.5
+"""The same (s) while it has no message from after its start: the flight waits for it, or a busy machine is slow."""
 
 SOON = 1_000_000
 """The same (ns) for a node that has been busy: what has come meanwhile is received within this time."""
@@ -65,7 +68,7 @@ class ModuleNode(ConfiguredNode):
         self._publish_timing = self.publisher_of(Timing, topics.TIMING.of(self._instance.deputy))
         self._started = time_ns()
         self._waiting: dict[str, list[tuple[int, Any]]] = {}
-        self._catch_up_soon = self.create_wall_timer(SETTLING, self._catch_up)
+        self._catch_up_soon = self.create_wall_timer(STALLED, self._catch_up)
         self._catch_up_soon.cancel()
         self._has_caught_up = False
         self._began = inf
@@ -110,7 +113,9 @@ class ModuleNode(ConfiguredNode):
                 self._catch_up_soon.timer_period_ns, self._has_caught_up = SOON, True
             self._take(topic, record)
             return
-        # Until a node has caught up, what was before its start may come in parts.
+        # Until a node has caught up, what was before its start may come in parts; by each publisher in order.
+        if not self._has_caught_up and topic == self._instance.needed[0] and published >= self._started:
+            self._catch_up_soon.timer_period_ns = round(SETTLING * NANOSECONDS)
         if not self._waiting or (is_late and not self._has_caught_up):
             self._catch_up_soon.reset()
         self._waiting.setdefault(topic, []).append((published, record))

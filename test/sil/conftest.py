@@ -44,10 +44,10 @@ def wait_until(condition: Callable[[], bool], what: str, patience: float = PATIE
         time.sleep(0.05)
 
 
-def has_messages(bag: Path, topic: str) -> bool:
+def has_messages(bag: Path, topic: str, more_than: int = 0) -> bool:
     """Whether messages of a topic are on disk."""
     try:
-        return Bag(bag).topics[topic].count > 0
+        return Bag(bag).topics[topic].count > more_than
     except (ConfigurationError, KeyError):  # not made yet, or not yet heard of
         return False
 
@@ -59,6 +59,11 @@ def set_parameter(domain: int, node: str, name: str, value: Any) -> tuple[bool, 
     except ConfigurationError as rejection:
         return False, str(rejection)
     return True, ""
+
+
+def answers_again(bag: Path, topic: str) -> bool:
+    """Whether a restarted node's messages are on disk."""
+    return bool(Bag(bag).restarts([topic])[topic])
 
 
 class Terminal:
@@ -122,10 +127,10 @@ class Desk:
         self.terminals.append(terminal)
         return terminal
 
-    def take_off(self) -> tuple[Terminal, dict[str, Terminal]]:
+    def take_off(self, duration: float = 900.0) -> tuple[Terminal, dict[str, Terminal]]:
         """A flight that is recorded to `bag` and goes on while nodes are killed: the plant and the parts."""
         self.start("recorder", bag=self.directory / "bag")
-        plant = self.start("plant", duration=900.0, real_time_factor=100.0, deadline=MISSED, wait_for_recorder=True)
+        plant = self.start("plant", duration=duration, real_time_factor=100.0, deadline=MISSED, wait_for_recorder=True)
         terminals = {kind: self.start(kind) for kind in PARTS}
         wait_until(lambda: "acquired" in terminals["navigation"].text, "the first estimate")
         return plant, terminals

@@ -78,7 +78,7 @@ def test_a_bag_says_all_of_its_run_and_nothing_of_the_machine(fly: Callable[...,
 
 
 def test_a_recorder_that_comes_late_knows_exactly_what_it_missed(desk: Desk) -> None:
-    ticks = 8 * topics.QUEUE_DEPTH  # at this pace it has 7 s to come in
+    ticks = 16 * topics.QUEUE_DEPTH  # at this pace it has 15 s to come in
     plant = desk.start("plant", duration=float(ticks), real_time_factor=500.0)
     parts = [desk.start(kind) for kind in PARTS]
     with user(desk) as (node, executor):
