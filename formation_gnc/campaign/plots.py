@@ -95,8 +95,8 @@ def scatters(
         if isfinite(requirement.limit) and len(good):
             ends = np.array([drawn[good].min(), drawn[good].max()])
             curves.append(Curve("limit", ends, np.full(2, requirement.limit), Style(RED, line="dashed")))
-        title = f"{each.drawn}, rank correlation {each.rank:+.2f}"
-        plots.append(Plot(title, Axis(title), Axis(requirement.figure), curves))
+        title = f"{each.words}, rank correlation {each.rank:+.2f}"
+        plots.append(Plot(title, Axis(each.drawn), Axis(requirement.figure), curves))
     return plots
 
 

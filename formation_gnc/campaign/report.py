@@ -162,7 +162,7 @@ def _parts(flights: Flights) -> Iterator[tuple[str, str, list[Plot]]]:
     first = campaign.configurations[0].name
     for requirement in asked:
         found = correlations(flights, requirement.figure, first, not requirement.relation.startswith(">"))
-        rows = [(each.drawn, f"{each.rank:+.3f}", f"{each.chance:.2g}") for each in found[:STRONGEST]]
+        rows = [(each.words, f"{each.rank:+.3f}", f"{each.chance:.2g}") for each in found[:STRONGEST]]
         listed = table_of(("drawn value", "rank correlation", "probability by chance"), rows)
         words = f"What hurts: {requirement.figure}" + ("" if first == NOMINAL else f", {first}")
         yield words, listed, scatters(flights, requirement, first, found[:DRAWN])

@@ -44,6 +44,7 @@ def flights(tmp_path_factory) -> Flights:
             row = {"case": case, "variant": variant, "reason": "", "plant.deputy1.mass": mass}
             row |= {"plant.deputy1.drag_coefficient": drag}
             row |= {"deputy1.final_error_m": 0.01 * case + 0.1 * number + noise, "nearest_approach_m": 60.0}
+            row["nearest_approach_m"] -= abs(drag - 1.5)
             row |= {"deputy1.nis_ratio": 1.0, "deputy1.nis_values": 100.0}
             row |= {"deputy1.nees_ratio": 1.0, "deputy1.nees_values": 6.0}
             if case == 7:
@@ -97,6 +98,13 @@ def test_what_hurts_comes_first(flights):
     first, second = correlations(flights, "final_error_m", "lqr")
     assert first.drawn == "plant.deputy1.mass"
     assert first.rank > 0.99
+    assert abs(second.rank) < 0.3
+
+
+def test_what_hurts_to_both_sides_is_seen_by_its_distance(flights):
+    first, second = correlations(flights, "nearest_approach_m", "lqr", upper=False)
+    assert first.words == "distance of plant.deputy1.drag_coefficient from its median"
+    assert first.rank < -0.9
     assert abs(second.rank) < 0.3
 
 
