@@ -20,8 +20,9 @@ from formation_gnc.recording.in_process_recorder import reader
 from formation_gnc.recording.topic_definition import TopicDefinition
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.records import EventKind, Timing
-from formation_gnc.sil.replay import nodes_of, parameters_of, replay
+from formation_gnc.sil.replay import replay
 from formation_gnc.sil.scenario import find_scenario, load_scenario
+from formation_gnc.sil.starts import nodes_of, starts_of
 from formation_gnc.types import NANOSECONDS
 
 pytestmark = pytest.mark.usefixtures("without_pictures")
@@ -188,14 +189,13 @@ def test_scheduled_and_manual_changes_replay_at_their_tick(tmp_path: Path, capsy
     assert list(Bag(bag).arrays("/events")["kind"]).count(EventKind.PARAMETERS) == 3
     # without the schedule in the parameters, the same changes are manual ones
     recorded = Bag(bag)
-    values = {node: parameters_of(recorded, node) for node in nodes_of(recorded, list(MODULES))}
-    for each in values.values():
-        each.pop("schedule", None)
+    starts = starts_of(recorded, nodes_of(recorded, list(MODULES)), reader(recorded))
     copied: list[tuple[str, int]] = []
     outputs: list[tuple[str, Any]] = []
     replay(
         recorded,
-        values,
+        starts,
+        {node: {"schedule": ()} for node in starts},
         reader(recorded),
         lambda topic, record: outputs.append((topic, record)),
         lambda topic, data, stamp: copied.append((topic, stamp)),
@@ -205,6 +205,17 @@ def test_scheduled_and_manual_changes_replay_at_their_tick(tmp_path: Path, capsy
     forces = np.array([record.force for topic, record in outputs if topic == "/deputy1/thrust"])
     assert forces.tobytes() == recorded.arrays("/deputy1/thrust")["force"].tobytes()
     assert not {topic for topic, _ in copied} & {topic for topic, _ in outputs if topic != "/events"}
+
+
+@pytest.mark.thorough
+def test_parameters_asked_for_after_a_change_replay_as_those_of_the_start(tmp_path: Path) -> None:
+    (tmp_path / "swaps.yaml").write_text(find_scenario("leader_follower").read_text() + SWAPS)
+    bag, node = tmp_path / "swaps", "parameters /deputy1/controller"
+    assert main(["sil", str(tmp_path / "swaps.yaml"), "--in-process", "--bag", str(bag), "--duration", "300"]) == 0
+    late = {node: Bag(bag).metadata[node] | {"algorithm": '"coast"', "schedule": "[]"}}
+    status, again = replayed(rewritten(Bag(bag), tmp_path / "late", {}, late), tmp_path / "again")
+    assert status == 0
+    assert again.metadata[node]["algorithm"] == '"lqr"'
 
 
 def rewritten(

@@ -4,28 +4,25 @@ What flew is taken from the bag alone. Parameters are its metadata records `para
 are either scheduled there, or are the `/events` of kind PARAMETERS and are committed again at their tick. A
 module is given an input only where it was given it in the recorded run, as its `timing` records; one that had
 been started again, whose messages are numbered from 1 again, is here too, with the parameters that it was
-started with then, `parameters NODE from STAMP`.
+started with then, `parameters NODE from STAMP` (:mod:`formation_gnc.sil.starts`).
 
 The truth is recorded, not flown: changed modules say what they would have commanded, and nothing answers them.
 """
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
-from formation_gnc.flight.graph import MODULES, ModuleInstance, Row, missing, modules_named
-from formation_gnc.parameters import OWN_OF_ROS, from_json, load
-from formation_gnc.recording.provenance import parameters_record
+from formation_gnc.flight.graph import MODULES, ModuleInstance, Row, missing
+from formation_gnc.parameters import from_json, load
 from formation_gnc.recording.reader import Bag
 from formation_gnc.records import EstimateStatus, Event, EventKind, Timing
 from formation_gnc.sil.simulation import Sink
+from formation_gnc.sil.starts import Decode, Start, node_name, timed_node
 from formation_gnc.types import NANOSECONDS
-
-Decode = Callable[[str, bytes], Any]
-"""The record of a message, given its topic and CDR bytes; None for one that no module takes."""
 
 Copy = Callable[[str, bytes, int], None]
 """Takes what was recorded and is not replayed: topic, CDR bytes, stamp in ns."""
@@ -34,23 +31,33 @@ Copy = Callable[[str, bytes, int], None]
 class ReplayedModule:
     """One module, run again; started again where it had been in the recorded run."""
 
-    def __init__(self, node: str, values: Mapping[str, Any], without: Collection[str] = ()) -> None:
-        """Build it from its parameters; raises ConfigurationError for what cannot be flown.
+    def __init__(
+        self, node: str, starts: Sequence[Start], overrides: Mapping[str, Any], without: Collection[str] = ()
+    ) -> None:
+        """Build it as it was first started; raises ConfigurationError for what cannot be flown.
 
-        without: full names of dispensable topics that neither the bag nor the replay has.
+        Args:
+            node: its full name.
+            starts: its starts in the recorded run, sorted.
+            overrides: parameters that are not as they were.
+            without: full names of dispensable topics that neither the bag nor the replay has.
         """
         self.without = without
         self.node, self.deputy = node, topics.deputy_of(node)
-        self.row: Row = MODULES[_name(node)]
-        self.restarts: dict[int, Any] = {}
-        """Parameters by the stamps of the first ticks of processes that had been started again."""
+        self.row: Row = MODULES[node_name(node)]
+        self.starts: dict[int, Any] = {}
+        """Parameters by the stamps of the first ticks of its processes."""
+        for start in starts:
+            if start.values or not self.starts:
+                latest = load(self.row.parameters, {**start.values, **overrides})
+            self.starts[start.stamp] = latest
         self.answer, self.timing = self.row.answer.of(self.deputy), topics.TIMING.of(self.deputy)
         self.orphans = 0
         """Ticks whose input the bag lacks though it was answered."""
         self.unheard: tuple[int, Sequence[Any], Sequence[Event]] | None = None
         """Stamp, inputs and swaps of the last tick of which the bag has no answer, though it could have given one."""
         self._was_given_input = True
-        self.start(load(self.row.parameters, values))
+        self.start(self.starts.pop(starts[0].stamp))
 
     def start(self, parameters: Any) -> None:
         """Start as a process with these parameters does."""
@@ -66,8 +73,8 @@ class ReplayedModule:
             recorded: its answer in that run, if there is one.
         """
         acquired = getattr(recorded, "status", None) == EstimateStatus.ACQUIRED
-        if was_given and (stamp in self.restarts or (acquired and not self._was_given_input)):
-            self.start(self.restarts.get(stamp, self.parameters))
+        if was_given and (stamp in self.starts or (acquired and not self._was_given_input)):
+            self.start(self.starts.get(stamp, self.parameters))
         self._was_given_input = was_given
         return was_given
 
@@ -101,40 +108,26 @@ def _values(swap: Event, changes: Mapping[str, str]) -> dict[str, Any]:
         raise ConfigurationError(f"{swap.node}: a change recorded at tick {swap.tick} is no JSON ({error})") from None
 
 
-def parameters_of(bag: Bag, node: str, start: int | None = None) -> dict[str, Any]:
-    """Parameters that a node was started with, as the bag has them; empty when it has none.
-
-    start: stamp (ns) of its first answer after it had been started again; None for its first start. Raises
-    ConfigurationError for values that are no JSON.
-    """
-    recorded = bag.metadata.get(parameters_record(node, start), {})
-    try:
-        return {name: from_json(text) for name, text in recorded.items() if not name.startswith(OWN_OF_ROS)}
-    except ValueError as error:
-        raise ConfigurationError(f"{bag.path}: recorded parameters of {node} are no JSON ({error})") from None
-
-
-def nodes_of(bag: Bag, modules: Sequence[str]) -> list[str]:
-    """Full names of the bag's nodes of the named modules, in the order in which they answer."""
-    rows, deputies = modules_named(modules), topics.deputies_in(bag.topics)
-    if not deputies:
-        raise ConfigurationError(f"{bag.path}: has no measurements to replay")
-    return [f"/{deputy}/{row.name}" for row in rows for deputy in deputies]
-
-
 def has_flown(bag: Bag, node: str) -> bool:
     """Whether a bag has any output of a node."""
-    outputs = (topic.of(topics.deputy_of(node)) for topic in MODULES[_name(node)].gives)
+    outputs = (topic.of(topics.deputy_of(node)) for topic in MODULES[node_name(node)].gives)
     return any(topic in bag.topics and bag.topics[topic].count for topic in outputs)
 
 
-def replay(bag: Bag, parameters: Mapping[str, Mapping[str, Any]], decode: Decode, sink: Sink, copy: Copy) -> list[str]:
+def replay(
+    bag: Bag,
+    starts: Mapping[str, Sequence[Start]],
+    overrides: Mapping[str, Mapping[str, Any]],
+    decode: Decode,
+    sink: Sink,
+    copy: Copy,
+) -> list[str]:
     """Run a bag's inputs through modules again, tick by tick.
 
     Args:
         bag: the recorded run.
-        parameters: of every node to replay, by full name, in the order of `nodes_of`. Those that are not as
-            recorded override what is recorded at every start.
+        starts: of every node to replay, by full name, in the order of `nodes_of`.
+        overrides: parameters of nodes that are not as they were, at any start.
         decode: makes records of messages.
         sink: takes topic and record of all that the modules publish.
         copy: takes every other message as it was recorded, sorted by stamp.
@@ -145,51 +138,29 @@ def replay(bag: Bag, parameters: Mapping[str, Mapping[str, Any]], decode: Decode
     Raises:
         ConfigurationError: parameters that cannot be flown, or a recorded change that these do not allow.
     """
-    modules = []
+    modules, remarks = [], []
     given = {name for name, topic in bag.topics.items() if topic.count}
-    given |= {topic.of(topics.deputy_of(node)) for node in parameters for topic in MODULES[_name(node)].gives}
-    for node, values in parameters.items():
-        row, deputy = MODULES[_name(node)], topics.deputy_of(node)
-        without = {each.topic.of(deputy) for each in row.takes_of_before} - given
-        if not values:
-            raise ConfigurationError(f"{bag.path}: has no parameters of {node}; give them in a file")
+    given |= {topic.of(topics.deputy_of(node)) for node in starts for topic in MODULES[node_name(node)].gives}
+    for node, own in starts.items():
+        without = {each.topic.of(topics.deputy_of(node)) for each in MODULES[node_name(node)].takes_of_before} - given
         try:
-            modules.append(ReplayedModule(node, values, without))
+            if not own[0].values and not overrides.get(node):
+                raise ConfigurationError(f"{bag.path}: has no parameters of {node}; give them in a file")
+            module = ReplayedModule(node, own, overrides.get(node, {}), without)
         except ConfigurationError as error:
             raise ConfigurationError(f"{node}: {error}") from None
-    remarks = list(_note_restarts(bag, modules, parameters, decode))
+        modules.append(module)
+        remarks += [
+            f"{node} was started again at {start.answer / NANOSECONDS:g} s; the bag lacks with which parameters, so it "
+            "flies with those before"
+            for start in own
+            if start.answer is not None and not start.values
+        ]
     _Replay(bag, modules, decode, sink, copy).run()
     orphans = sum(module.orphans for module in modules)
     if orphans:
         remarks.append(f"{orphans} answers as recorded, not flown: the bag lacks what they answer")
     return remarks
-
-
-def _note_restarts(
-    bag: Bag, modules: Sequence[ReplayedModule], parameters: Mapping[str, Mapping[str, Any]], decode: Decode
-) -> Iterator[str]:
-    """Tell every module when it is to start again, and with what; yields what the bag lacks for that."""
-    restarts = bag.restarts([module.answer for module in modules])
-    timings = sorted({module.timing for module in modules})
-    first_ticks = bag.restarts(timings, lambda topic, data: _timed_node(topic, decode(topic, data)))
-    for module in modules:
-        recorded, latest = parameters_of(bag, module.node), module.parameters
-        given = parameters[module.node]
-        changes = {name: value for name, value in given.items() if value != recorded.get(name)}
-        before = -1
-        for stamp in sorted(restarts[module.answer]):
-            values = parameters_of(bag, module.node, stamp)
-            if values:
-                latest = load(module.row.parameters, values | changes)
-            else:
-                yield (
-                    f"{module.node} was started again at {stamp / NANOSECONDS:g} s; the bag lacks with which "
-                    "parameters, so it flies with those before"
-                )
-            # Its first ticks may have had no answer: navigation without a fix to start from.
-            own = [each for each in first_ticks.get(module.node, ()) if before < each <= stamp]
-            module.restarts[max(own, default=stamp)] = latest
-            before = stamp
 
 
 @dataclass
@@ -247,7 +218,7 @@ class _Replay:
             return True
         if _is_timing(topic):
             timing = self._decode(topic, data)
-            node = _timed_node(topic, timing)
+            node = timed_node(topic, timing)
             tick.timed[node] = timing.missing if timing else []
             return node in self._nodes
         return topic in self._outputs
@@ -318,15 +289,5 @@ class _Replay:
         return self._decode(topic, messages[-1]) if messages else None
 
 
-def _name(node: str) -> str:
-    """Name of a node's module in the graph table."""
-    return node.rpartition("/")[2]
-
-
 def _is_timing(topic: str) -> bool:
     return topic == topics.TIMING.of(topics.deputy_of(topic))
-
-
-def _timed_node(topic: str, timing: Timing | None) -> str:
-    """Full name of the node that a timing is of."""
-    return f"/{topics.deputy_of(topic)}/{timing.node if timing else ''}"

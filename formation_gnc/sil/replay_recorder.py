@@ -1,8 +1,7 @@
 """Replays a bag into a new one."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import MODULES
@@ -11,8 +10,9 @@ from formation_gnc.recording.in_process_recorder import InProcessRecorder, reade
 from formation_gnc.recording.provenance import parameters_record, provenance
 from formation_gnc.recording.reader import Bag
 from formation_gnc.recording.writer import BagWriter
-from formation_gnc.sil.replay import has_flown, nodes_of, parameters_of, replay
+from formation_gnc.sil.replay import has_flown, replay
 from formation_gnc.sil.scenario import given_to
+from formation_gnc.sil.starts import nodes_of, starts_of
 
 
 def replay_into(bag: Bag, output: Path, modules: Sequence[str] | None, parameter_file: Path | None) -> list[str]:
@@ -30,27 +30,30 @@ def replay_into(bag: Bag, output: Path, modules: Sequence[str] | None, parameter
     Raises:
         ConfigurationError: no such module, parameters that cannot be flown, or a directory that exists.
     """
-    parameters: dict[str, Mapping[str, Any]] = {}
-    remarks = []
-    deputies = topics.deputies_in(bag.topics)
-    for node in nodes_of(bag, list(MODULES) if modules is None else modules):
-        changes = given_to(parameter_file, node, deputies) if parameter_file else {}
-        values = parameters_of(bag, node) | changes
-        if modules is None and not values and not has_flown(bag, node):
+    deputies, read = topics.deputies_in(bag.topics), reader(bag)
+    nodes = nodes_of(bag, list(MODULES) if modules is None else modules)
+    overrides = {node: given_to(parameter_file, node, deputies) for node in nodes} if parameter_file else {}
+    starts, remarks = starts_of(bag, nodes, read), []
+    for node in nodes:
+        if modules is None and not starts[node][0].values and not overrides.get(node) and not has_flown(bag, node):
             remarks.append(f"{node} is left out: the bag has neither parameters nor records of it")
-            continue
-        parameters[node] = values
+            del starts[node]
     flown = {
-        parameters_record(node): {name: to_json(value) for name, value in values.items()}
-        for node, values in parameters.items()
+        parameters_record(node, start.answer): {
+            name: to_json(value) for name, value in {**start.values, **overrides.get(node, {})}.items()
+        }
+        for node, own in starts.items()
+        for start in own
+        if start.values or start is own[0]
     }
-    origin = {"replay": {"source": bag.path.absolute().name, "nodes": ", ".join(parameters)}}
+    origin = {"replay": {"source": bag.path.absolute().name, "nodes": ", ".join(starts)}}
     with BagWriter(output, bag.metadata | provenance() | flown | origin, bag.attachments) as writer:
         recorder = InProcessRecorder(writer)
         return remarks + replay(
             bag,
-            parameters,
-            reader(bag),
+            starts,
+            overrides,
+            read,
             recorder,
             lambda topic, data, stamp: recorder.copy(bag, topic, data, stamp),
         )

@@ -7,13 +7,14 @@ from functools import cache
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight.module import Condition, Configuration, FlightModule
 from formation_gnc.mode_records import CHIEF, NO_FORCE, STATE, HealthReport, Mode, ModeState
-from formation_gnc.parameters import change
+from formation_gnc.parameters import change, to_json
 from formation_gnc.records import (
     NO_NEIGHBOURS,
     Estimate,
     EstimateStatus,
     EventKind,
     Measurement,
+    ParameterChange,
     Status,
     Target,
     Thrust,
@@ -265,7 +266,8 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         if self._mode in EVASIVE:
             self._evasion = self._way_out(time, estimate, target)
             detail += f"; {self._evasion.words}"
-        self.log(time, EventKind.MODE, detail, str(self._mode))
+        change_of_mode = ParameterChange("mode", to_json(str(before)), to_json(str(self._mode)))
+        self.log(time, EventKind.MODE, detail, str(self._mode), [change_of_mode])
 
     def _is_fix_due(self, time: int) -> bool:
         """Whether sensors contradict the state in `safe`, and it was not begun anew since the last thrust."""

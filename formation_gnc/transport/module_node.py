@@ -176,7 +176,7 @@ class ModuleNode(ConfiguredNode):
             self.publish_event(event)
             if event.kind in WARNINGS:
                 self._warning = str(event)
-            if event.kind in (EventKind.PARAMETERS, EventKind.REJECTED, EventKind.MODE):
+            if event.changes or event.kind == EventKind.REJECTED:
                 self.show_parameters(dump(self._module.parameters))
 
     def _diagnose(self) -> None:

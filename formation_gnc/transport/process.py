@@ -1,5 +1,6 @@
 """The process of a node: signals, exit status, and the order of its end."""
 
+import faulthandler
 import gc
 import os
 import signal
@@ -22,6 +23,9 @@ REJECTED_BY_ROS = (RCLInvalidROSArgsError, UnknownROSArgsError, RCLError, RMWErr
 
 LONGEST_END = 10.0
 """Wall time (s) that a node has to leave the graph."""
+
+HUNG = 5.0
+"""Wall time (s) beyond it after which the middleware holds the interpreter itself, and nothing here runs any more."""
 
 _stop_signals: list[int] = []
 """Plain list: signal handlers must not lock."""
@@ -64,8 +68,8 @@ def run[E: Executable](make: Callable[[], E], work: Callable[[E], None] | None =
         make: the node.
         work: what it does until its end; its `spin` by default.
 
-    The exit status is 0 after an ordinary end or an interruption, 1 when a satellite came down, the recorder is lost
-    or the disk failed, 2 when something given to the node is not allowed.
+    The exit status is 0 after an ordinary end or an interruption, 1 when a satellite came down, the recorder is lost,
+    the disk failed or the middleware hangs at the end, 2 when something given to the node is not allowed.
     """
     node, status = None, 1
     name = Path(sys.argv[0]).name
@@ -87,6 +91,7 @@ def run[E: Executable](make: Callable[[], E], work: Callable[[E], None] | None =
     watchdog = Timer(LONGEST_END, os._exit, (status,))
     watchdog.daemon = True
     watchdog.start()
+    faulthandler.dump_traceback_later(LONGEST_END + HUNG, exit=True)  # from a thread that needs no interpreter
     try:
         if node is not None:
             node.destroy_node()

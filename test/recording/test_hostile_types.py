@@ -10,11 +10,12 @@ from formation_gnc.messages.conversion import codec, to_cdr
 from formation_gnc.parameters import from_json
 from formation_gnc.recording import Bag
 from formation_gnc.recording.decode import MOST_VALUES, MessageType
+from formation_gnc.recording.in_process_recorder import reader
 from formation_gnc.recording.provenance import parameters_record
 from formation_gnc.recording.session import RecordingSession
 from formation_gnc.recording.writer import BagWriter
 from formation_gnc.records import Event, EventKind
-from formation_gnc.sil.replay import parameters_of
+from formation_gnc.sil.starts import starts_of
 
 LINE = b"=" * 80 + b"\n"
 
@@ -63,11 +64,11 @@ def test_a_value_nested_too_deeply_is_no_json() -> None:
 
 def test_a_bag_with_parameters_nested_too_deeply_is_read_and_not_replayed(tmp_path: Path) -> None:
     deep = {"tick": "[" * 100_000 + "]" * 100_000}
-    BagWriter(tmp_path / "bag", {parameters_record("/plant"): deep, parameters_record("/a/b"): deep}).close()
+    BagWriter(tmp_path / "bag", {parameters_record("/plant"): deep, parameters_record("/a/guidance"): deep}).close()
     bag = Bag(tmp_path / "bag")
     assert bag.tick_ns == 0
-    with pytest.raises(ConfigurationError, match="recorded parameters of /a/b are no JSON"):
-        parameters_of(bag, "/a/b")
+    with pytest.raises(ConfigurationError, match="recorded parameters of /a/guidance are no JSON"):
+        starts_of(bag, ["/a/guidance"], reader(bag))
 
 
 def test_what_is_no_event_is_left_out_of_the_bag_and_counted(tmp_path: Path) -> None:

@@ -112,8 +112,7 @@ def test_nodes_restarted_with_other_parameters_replay_with_them(desk: Desk, caps
         "controller": ("/deputy1/thrust", {"algorithm": "mpc"}),
         "guidance": ("/deputy1/target", {"leader_follower.separation": 120.0}),
         "navigation": ("/deputy1/estimate", {"radius_sigma": 50.0}),
-        # In keep from its start: a recorder that asks late is told the mode of then, a known fault of restarts.
-        "supervisor": ("/deputy1/mode", {"tube": 20.0, "mode": "keep"}),
+        "supervisor": ("/deputy1/mode", {"tube": 20.0}),
     }
     for flown, (kind, (answer, parameters)) in enumerate(otherwise.items(), start=1):
         wait_until(lambda topic=answer, most=100 * flown: has_messages(bag, topic, most), f"answers of the {kind}")

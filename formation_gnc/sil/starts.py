@@ -1,0 +1,107 @@
+"""Starts of the modules of a recorded run: when, and with what parameters."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from formation_gnc.errors import ConfigurationError
+from formation_gnc.flight import topics
+from formation_gnc.flight.graph import MODULES, modules_named
+from formation_gnc.parameters import OWN_OF_ROS, from_json
+from formation_gnc.recording.provenance import parameters_record
+from formation_gnc.recording.reader import Bag
+from formation_gnc.records import ParameterChange, Timing
+
+Decode = Callable[[str, bytes], Any]
+"""The record of a message, given its topic and CDR bytes; None for one that no module takes."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """One start of a node."""
+
+    stamp: int
+    """Of its first tick, ns; 0 for the first start."""
+    answer: int | None
+    """Stamp of its first answer, ns; None for the first start."""
+    values: Mapping[str, Any]
+    """Parameters by name; empty where the bag has none."""
+
+
+def starts_of(bag: Bag, nodes: Sequence[str], decode: Decode) -> dict[str, list[Start]]:
+    """Every start of nodes, by their full names, each list sorted and with the first start at its head.
+
+    A recorder asks for parameters when it has heard a node answer; some may have changed by then. The event of such a
+    change has the value before it, which is that of the start.
+
+    Raises:
+        ConfigurationError: recorded values that are no JSON.
+    """
+    answers = {node: MODULES[node_name(node)].answer.of(topics.deputy_of(node)) for node in nodes}
+    timings = sorted({topics.TIMING.of(topics.deputy_of(node)) for node in nodes})
+    answered = bag.restarts(list(answers.values()))
+    ticked = bag.restarts(timings, lambda topic, data: timed_node(topic, decode(topic, data)))
+    changes = _changes(bag, decode)
+    found: dict[str, list[Start]] = {}
+    for node in nodes:
+        begun: list[tuple[int, int | None]] = [(0, None)]
+        before = -1
+        for answer in sorted(answered[answers[node]]):
+            # Its first ticks may have had no answer: navigation without a fix to start from.
+            own = [stamp for stamp in ticked.get(node, ()) if before < stamp <= answer]
+            begun.append((max(own, default=answer), answer))
+            before = answer
+        ends = [stamp for stamp, _ in begun[1:]] + [2**64]
+        found[node] = [
+            Start(stamp, answer, _values(bag, node, answer, _first(changes.get(node, ()), stamp, end)))
+            for (stamp, answer), end in zip(begun, ends, strict=True)
+        ]
+    return found
+
+
+def nodes_of(bag: Bag, modules: Sequence[str]) -> list[str]:
+    """Full names of the bag's nodes of the named modules, in the order in which they answer."""
+    rows, deputies = modules_named(modules), topics.deputies_in(bag.topics)
+    if not deputies:
+        raise ConfigurationError(f"{bag.path}: has no measurements to replay")
+    return [f"/{deputy}/{row.name}" for row in rows for deputy in deputies]
+
+
+def node_name(node: str) -> str:
+    """Name of a node's module in the graph table."""
+    return node.rpartition("/")[2]
+
+
+def timed_node(topic: str, timing: Timing | None) -> str:
+    """Full name of the node that a timing is of."""
+    return f"/{topics.deputy_of(topic)}/{timing.node if timing else ''}"
+
+
+def _changes(bag: Bag, decode: Decode) -> dict[str, list[tuple[int, ParameterChange]]]:
+    """Changes of parameters in flight by node, with their stamps (ns), sorted."""
+    found: dict[str, list[tuple[int, ParameterChange]]] = {}
+    events = topics.EVENTS.name
+    for stamp, topic, messages in bag.by_stamp([events] if events in bag.topics else []):
+        for event in (decode(topic, data) for data in messages):
+            if event is not None and event.changes:
+                found.setdefault(event.node, []).extend((stamp, each) for each in event.changes)
+    return found
+
+
+def _first(changes: Sequence[tuple[int, ParameterChange]], start: int, end: int) -> dict[str, str]:
+    """Values, JSON, before the first change of each parameter from a stamp on and before another."""
+    first: dict[str, str] = {}
+    for stamp, each in changes:
+        if start <= stamp < end:
+            first.setdefault(each.name, each.old_value)
+    return first
+
+
+def _values(bag: Bag, node: str, answer: int | None, before: Mapping[str, str]) -> dict[str, Any]:
+    """Parameters at a start, given what was recorded after it and the values, JSON, before later changes."""
+    recorded = bag.metadata.get(parameters_record(node, answer), {})
+    own = {name: before.get(name, text) for name, text in recorded.items() if not name.startswith(OWN_OF_ROS)}
+    try:
+        return {name: from_json(text) for name, text in own.items()}
+    except ValueError as error:
+        raise ConfigurationError(f"{bag.path}: recorded parameters of {node} are no JSON ({error})") from None
