@@ -12,6 +12,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.service import Service
 
 from formation_gnc.flight import topics
+from formation_gnc.flight.backlog import STALLED, Backlog
 from formation_gnc.flight.graph import ModuleInstance, Row, missing
 from formation_gnc.flight.reception import Information, figures
 from formation_gnc.parameters import dump
@@ -21,23 +22,11 @@ from formation_gnc.transport.diagnostics import PERIOD, DiagnosticsPublisher
 from formation_gnc.transport.node import CHECK_PERIOD, ConfiguredNode, rejected
 from formation_gnc.types import NANOSECONDS
 
-SETTLING = 0.1
-"""Wall time (s) without another one after which a node that comes into a flight going on has all that came before."""
-
-STALLED = 0.5
-"""The same (s) while it has no message from after its start: the flight waits for it, or a busy machine is slow."""
-
-SOON = 1_000_000
-"""The same (ns) for a node that has been busy: what has come meanwhile is received within this time."""
-
 DESIGNS = 8
 """Requests to change parameters that may wait for their designs; more are rejected."""
 
 ALONE = 1.0
 """Wall time (s) for which a dispensable input is awaited that no node is known to publish."""
-
-LATE = 50_000_000
-"""Wall time (ns) after which a message that is received counts as one of several that wait."""
 
 
 class ModuleNode(ConfiguredNode):
@@ -47,9 +36,7 @@ class ModuleNode(ConfiguredNode):
     that no answer waits for it, and takes effect at the next tick; it is answered when that is settled, with
     the reason if it is rejected.
 
-    A node that comes late, or has been busy, finds several messages, and answers the last tick only: an answer to
-    an older one would look like a new run to those who have gone on. What its module cannot start without is not
-    skipped, if it was published after the node's start.
+    A node that comes late, or has been busy, finds several messages, and goes on with one of them (:class:`Backlog`).
     """
 
     def __init__(self, row: Row, bus: IntraProcessBus | None = None) -> None:
@@ -66,11 +53,9 @@ class ModuleNode(ConfiguredNode):
             topic.of(self._instance.deputy): self._published(topic) for topic in self._instance.published()
         }
         self._publish_timing = self.publisher_of(Timing, topics.TIMING.of(self._instance.deputy))
-        self._started = time_ns()
-        self._waiting: dict[str, list[tuple[int, Any]]] = {}
-        self._catch_up_soon = self.create_wall_timer(STALLED, self._catch_up)
+        self._backlog = Backlog(self._instance, time_ns())
+        self._catch_up_soon = self.create_wall_timer(STALLED / NANOSECONDS, self._catch_up)
         self._catch_up_soon.cancel()
-        self._has_caught_up = False
         self._began = inf
         """Since when (s of a monotonic clock) a tick waits for what may have no publisher; infinite for none."""
         self.create_wall_timer(CHECK_PERIOD, self._forgo)
@@ -105,39 +90,17 @@ class ModuleNode(ConfiguredNode):
                 self.subscribe(record, topic, partial(self._receive, topic))
 
     def _receive(self, topic: str, record: Any, about: Information) -> None:
-        published = about["source_timestamp"]
-        is_behind = topic == self._instance.needed[0] and self._instance.synchronizer.unanswered is not None
-        is_late = time_ns() - published >= LATE
-        if not self._waiting and not is_behind and not is_late:
-            if not self._has_caught_up:
-                self._catch_up_soon.timer_period_ns, self._has_caught_up = SOON, True
+        now, due = time_ns(), self._backlog.due
+        if self._backlog.add(topic, record, about["source_timestamp"], now):
             self._take(topic, record)
-            return
-        # Until a node has caught up, what was before its start may come in parts; by each publisher in order.
-        if not self._has_caught_up and topic == self._instance.needed[0] and published >= self._started:
-            self._catch_up_soon.timer_period_ns = round(SETTLING * NANOSECONDS)
-        if not self._waiting or (is_late and not self._has_caught_up):
+        elif self._backlog.due is not None and self._backlog.due != due:
+            self._catch_up_soon.timer_period_ns = self._backlog.due - now
             self._catch_up_soon.reset()
-        self._waiting.setdefault(topic, []).append((published, record))
 
     def _catch_up(self) -> None:
-        """Go on with the last tick of those that wait, or with what the module cannot do without."""
+        """Go on with what waits."""
         self._catch_up_soon.cancel()
-        waiting, self._waiting = self._waiting, {}
-        records = {topic: _of_latest_run(messages) for topic, messages in waiting.items()}
-        pace = self._instance.needed[0]
-        pacing = records.get(pace, [])
-        addressed = [record for published, record in pacing[:-1] if published >= self._started]
-        addressed += [record for _, record in pacing[-1:]]
-        begun = self._instance.synchronizer.unanswered
-        if begun is not None and addressed and begun.time < addressed[0].time:
-            addressed.insert(0, begun)  # what it awaits may be among those that wait
-        first = self._module.first_of(addressed).time if addressed else 0
-        kept = []
-        for topic, messages in records.items():
-            begin = first - self._module.parameters.tick_ns * (topic in self._instance.delayed)
-            kept += [(topic, each) for _, each in messages if each.time >= begin]
-        for topic, record in sorted(kept, key=lambda each: (each[1].time, each[0] == pace)):
+        for topic, record in self._backlog.take():
             self._take(topic, record)
 
     def _take(self, topic: str, record: Any) -> None:
@@ -214,12 +177,6 @@ class ModuleNode(ConfiguredNode):
         """Let no design outlive the node."""
         self._designer.shutdown(wait=False, cancel_futures=True)
         super().destroy_node()
-
-
-def _of_latest_run(messages: list[tuple[int, Any]]) -> list[tuple[int, Any]]:
-    """Messages, each with when it was published, from the last one on whose stamp went back."""
-    backward = [place for place in range(1, len(messages)) if messages[place][1].time < messages[place - 1][1].time]
-    return messages[backward[-1] if backward else 0 :]
 
 
 def _answer_from(pool: ThreadPoolExecutor, service: Service, free: BoundedSemaphore) -> None:
