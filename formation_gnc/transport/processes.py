@@ -9,7 +9,6 @@ from pathlib import Path
 from time import monotonic, sleep
 
 from formation_gnc.errors import ConfigurationError
-from formation_gnc.transport import MIDDLEWARE
 from formation_gnc.transport.fork_server import ForkedProcess, fork_server
 
 GRACE = 2.0
@@ -86,7 +85,8 @@ class Graph:
 
     def _environment(self) -> dict[str, str]:
         """Variables of a node: those of this process as they are now, which the enclaves of a flight change."""
-        return MIDDLEWARE | os.environ | {"ROS_DOMAIN_ID": str(self._domain)}
+        reach = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+        return reach | os.environ | {"ROS_DOMAIN_ID": str(self._domain)}
 
     def check(self) -> None:
         """Raise NodeDied if a node has ended with an error, and is not to be started again."""
