@@ -71,6 +71,18 @@ class RecordingProgress:
         recorded = min(stamps, default=NONE)
         return self._end if len(stamps) == 1 and self._end > recorded else recorded
 
+    @property
+    def lacking(self) -> list[str]:
+        """Topics of which something is not recorded yet, though others have it of the same tick."""
+        latest = max(self._plant.values(), default=NONE)
+        found = [topic for topic, stamp in self._plant.items() if stamp < latest]
+        for deputy in filter(None, map(topics.deputy_of, self._plant)):
+            missed = self._missed.get(deputy, NONE)
+            for name, stamp in self._answers_of(deputy).items():
+                if self._counts(name, stamp, missed) and max(stamp, missed) < latest:
+                    found.append(f"/{deputy}/{name}")
+        return found
+
     def _recorded_of(self, deputy: str) -> int:
         """Stamp (ns) up to which a deputy has answered or missed.
 
@@ -78,7 +90,11 @@ class RecordingProgress:
         """
         missed = self._missed.get(deputy, NONE)
         answers = self._answers_of(deputy).items()
-        return max(min(stamp for name, stamp in answers if name in self._commanding or stamp >= missed), missed)
+        return max(min(stamp for name, stamp in answers if self._counts(name, stamp, missed)), missed)
+
+    def _counts(self, name: str, stamp: int, missed: int) -> bool:
+        """Whether an answer is waited for, given its latest stamp and that of the latest miss, ns."""
+        return name in self._commanding or stamp >= missed
 
     def _answers_of(self, deputy: str) -> dict[str, int]:
         answers = self._answers.get(deputy)

@@ -12,6 +12,7 @@ from formation_gnc.plant.parameters import PlantParameters
 from formation_gnc.records import Thrust
 from formation_gnc.sil.report import Report
 from formation_gnc.sil.simulation import Simulation, Sink
+from formation_gnc.types import NANOSECONDS
 
 CHECK_PERIOD = 0.05
 """Wall time (s) between checks of deadlines, of the recorder and of who is there."""
@@ -30,6 +31,10 @@ COMPANY = 60.0
 
 LINGERING = 30.0
 """Wall time (s) after which DDS has forgotten a node that was killed: two of one name for longer are two."""
+
+
+STALLED = 30.0
+"""Wall time (s) for which the run waits for a recorder that records nothing, after which somebody should look."""
 
 
 class Surroundings(Protocol):
@@ -74,6 +79,8 @@ class PlantExecutive:
         self._commands = {COMMAND.of(deputy): deputy for deputy in deputies}
         self._troubles: dict[str, None] = {}
         self._recorder_is_missed = False
+        self._recorded_at = 0.0
+        """When the recorder last had more than before, s."""
         self._shared_since: dict[str, float] = {}
         self._needed = frozenset(row.answer.of(deputy) for deputy in deputies for row in commanding())
         """Answers without which there is no command."""
@@ -97,7 +104,7 @@ class PlantExecutive:
         elif not self.finished:
             self._look_for_recorder()
             barrier.check(now)
-            self._say_what_is_awaited(barrier.decide(now))
+            self._say_what_is_awaited(barrier.decide(now), now)
             self.advance_if_ready(now)
             if now - self._reported > REPORT_PERIOD and not self.finished:
                 self._note_troubles(now)
@@ -113,6 +120,8 @@ class PlantExecutive:
 
     def recorded(self, stamp: int, now: float) -> None:
         """Take the recorder's word that it has everything up to a stamp (ns)."""
+        if stamp != self.simulation.barrier.recorded:
+            self._recorded_at = now
         self.simulation.barrier.recorded = stamp
         if self.simulation.has_begun:
             self.advance_if_ready(now)
@@ -179,9 +188,12 @@ class PlantExecutive:
             if is_shared(publishers) or contradicts or now - since > LINGERING:
                 found.append(f"{topic} has several publishers: {names_of(publishers)}")
         for trouble in found:
-            if trouble not in self._troubles:
-                self._troubles[trouble] = None
-                self._publish(topics.EVENTS.name, self.simulation.warning(trouble))
+            self._note_trouble(trouble)
+
+    def _note_trouble(self, trouble: str) -> None:
+        if trouble not in self._troubles:
+            self._troubles[trouble] = None
+            self._publish(topics.EVENTS.name, self.simulation.warning(trouble))
 
     def _absent(self) -> list[str]:
         return [topic for topic, _ in self.simulation.answers() if not self._around.publishers_of(topic)]
@@ -200,11 +212,14 @@ class PlantExecutive:
         ):
             yield RECORDER
 
-    def _say_what_is_awaited(self, decision: Decision) -> None:
+    def _say_what_is_awaited(self, decision: Decision, now: float) -> None:
         if not decision.overdue:
             return
         if RECORDER in decision.waiting_for:
             self._say(f"waiting for {RECORDER}, which lags behind")
+            if now - self._recorded_at > STALLED:
+                recorded = (self.simulation.barrier.recorded or 0) / NANOSECONDS
+                self._note_trouble(f"{RECORDER} records nothing after {recorded:g} s; the run waits for it")
         elif decision.waiting_for:
             self._say(f"waiting for the first answer of {', '.join(decision.waiting_for)}")
 

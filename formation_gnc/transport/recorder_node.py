@@ -14,6 +14,7 @@ from std_srvs.srv import Trigger
 from formation_gnc.flight import topics
 from formation_gnc.messages.conversion import codec
 from formation_gnc.recording.parameters import RecorderParameters
+from formation_gnc.recording.progress import NONE
 from formation_gnc.recording.provenance import provenance
 from formation_gnc.recording.session import RecordingSession
 from formation_gnc.recording.writer import FLUSH_INTERVAL, BagWriter, Split
@@ -58,6 +59,8 @@ class RecorderNode(ConfiguredNode):
         if directory != wanted:
             self.warn(topics.PROGRESS.name, f"{wanted} exists already: recording to {directory}")
         self._diagnostics = DiagnosticsPublisher(self, self.full_name("") or "/")
+        self._diagnosed = NONE
+        """Stamp (ns) up to which all was recorded at the last diagnosis."""
         self.create_wall_timer(PERIOD, self._diagnose)
         self._raw_topics = RawTopics(self, self._open, self.full_name(""))
         self._reader = ParameterReader(self)
@@ -104,8 +107,11 @@ class RecorderNode(ConfiguredNode):
             level, message = DiagnosticStatus.WARN, "messages were lost"
         elif stamp < 0:
             level, message = DiagnosticStatus.WARN, "waiting for a run"
+        elif stamp == self._diagnosed and (lacking := self.session.progress.lacking):
+            level, message = DiagnosticStatus.WARN, f"waiting for {' and '.join(lacking)}"
         if failure is not None:
             level, message = DiagnosticStatus.ERROR, str(failure)
+        self._diagnosed = stamp
         values = {"bag": self.session.bag.directory, "recorded_to": max(0, stamp) / NANOSECONDS, "lost": lost}
         self._diagnostics.publish(level, message, values, stamp)
 

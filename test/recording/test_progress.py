@@ -41,7 +41,9 @@ def test_a_tick_is_recorded_when_its_last_message_has_come() -> None:
             if topic != last:
                 progress.take(topic, 1)
         assert progress.stamp == 0, last
+        assert progress.lacking == [last]
         progress.take(last, 1)
+        assert progress.lacking == []
         assert progress.stamp == 1
 
 

@@ -10,7 +10,7 @@ from formation_gnc.errors import RecorderLostError
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import COMMAND, GRAPH
 from formation_gnc.records import EventKind, Thrust
-from formation_gnc.sil.plant_executive import PlantExecutive, Report
+from formation_gnc.sil.plant_executive import STALLED, PlantExecutive, Report
 from formation_gnc.sil.scenario import load_scenario
 from formation_gnc.sil.simulation import RECORDER_LAG
 
@@ -164,7 +164,13 @@ def test_a_recorder_that_lags_holds_the_plant_and_is_named(complete: Graph) -> N
         executive.check(float(now))
     assert complete.said[-1] == "waiting for /recorder, which lags behind"
     assert executive.simulation.misses == 0
-    executive.recorded(RECORDER_LAG * 10**9, 3.0)
+    assert not complete.events(EventKind.WARNING)
+    for now in (STALLED, STALLED + 1.0, STALLED + 2.0):
+        executive.check(now)
+    (warning,) = complete.events(EventKind.WARNING)
+    assert warning.detail == "/recorder records nothing after 0 s; the run waits for it"
+    assert complete.reports[-1].troubles == (warning.detail,)
+    executive.recorded(RECORDER_LAG * 10**9, STALLED + 3.0)
     assert executive.simulation.plant.tick == RECORDER_LAG + 2
 
 
