@@ -1,17 +1,17 @@
-"""Messages that wait for a module which comes into a flight going on, or has been busy."""
+"""Messages that wait for a module that joins a flight in progress, or has been busy."""
 
 from typing import Any
 
 from formation_gnc.flight.graph import ModuleInstance
 
 SETTLING = 100_000_000
-"""Wall time (ns) without another one after which a node that comes into a flight going on has all that came before."""
+"""Wall time (ns) without another message after which a node that joins a flight in progress has all from before."""
 
 STALLED = 500_000_000
-"""The same (ns) while it has no message from after its start: the flight waits for it, or a busy machine is slow."""
+"""As SETTLING, while nothing published after its start has arrived."""
 
 SOON = 1_000_000
-"""The same (ns) for a node that has been busy: what has come meanwhile is received within this time."""
+"""As SETTLING, for a node that has been busy: what has come meanwhile is received within this time."""
 
 LATE = 50_000_000
 """Wall time (ns) after which a message that is received counts as one of several that wait."""

@@ -10,7 +10,7 @@ def fly(node: PlantNode) -> None:
     """Fly the run to its end, and see the recorder through."""
     executive = node.executive
     node.spin(lambda: stop_requested() or executive.check(monotonic()), lambda: executive.period(monotonic()))
-    node.spin(lambda: stop_requested() or executive.recorder_is_done())
+    node.spin(lambda: stop_requested() or executive.recorder_is_done(monotonic()))
     figures = executive.simulation.figures(0.0)
     how = "finished" if executive.finished else "stopped"
     node.log(f"{how}: {figures['tick']} of {figures['ticks']} ticks flown, {figures['misses']} missed")

@@ -34,7 +34,7 @@ LINGERING = 30.0
 
 
 STALLED = 30.0
-"""Wall time (s) for which the run waits for a recorder that records nothing, after which somebody should look."""
+"""Wall time (s) without progress of the recorder, while the run waits for it, that is warned of."""
 
 
 class Surroundings(Protocol):
@@ -80,7 +80,9 @@ class PlantExecutive:
         self._troubles: dict[str, None] = {}
         self._recorder_is_missed = False
         self._recorded_at = 0.0
-        """When the recorder last had more than before, s."""
+        """Wall time (s) of the recorder's arrival or latest progress."""
+        self._stall = ""
+        """What was said of a recorder that makes no progress."""
         self._shared_since: dict[str, float] = {}
         self._needed = frozenset(row.answer.of(deputy) for deputy in deputies for row in commanding())
         """Answers without which there is no command."""
@@ -102,7 +104,7 @@ class PlantExecutive:
         if not self.simulation.has_begun:
             self._begin_if_all_are_there(now)
         elif not self.finished:
-            self._look_for_recorder()
+            self._look_for_recorder(now)
             barrier.check(now)
             self._say_what_is_awaited(barrier.decide(now), now)
             self.advance_if_ready(now)
@@ -122,6 +124,10 @@ class PlantExecutive:
         """Take the recorder's word that it has everything up to a stamp (ns)."""
         if stamp != self.simulation.barrier.recorded:
             self._recorded_at = now
+            if self._stall:
+                del self._troubles[self._stall]
+                self._stall = ""
+                self._warn_of_recorder(f"{RECORDER} records again")
         self.simulation.barrier.recorded = stamp
         if self.simulation.has_begun:
             self.advance_if_ready(now)
@@ -139,28 +145,44 @@ class PlantExecutive:
         pause = self.simulation.barrier.decide(now).pause if self.simulation.has_begun else 0.0
         return min(CHECK_PERIOD, pause) if pause > 0.0 else CHECK_PERIOD
 
-    def recorder_is_done(self) -> bool:
+    def recorder_is_done(self, now: float) -> bool:
         """Whether the recorder, if there is one, has everything to the end."""
         barrier = self.simulation.barrier
         barrier.has_recorder = self._around.has_recorder()
-        return barrier.recorder_is_done(self.simulation.plant.time)
+        if barrier.recorder_is_done(self.simulation.plant.time):
+            return True
+        self._look_for_stall(now)
+        return False
 
-    def _look_for_recorder(self) -> None:
+    def _look_for_recorder(self, now: float) -> None:
         """Go on, or end, as soon as a recorder has died; raises RecorderLostError to end."""
         barrier = self.simulation.barrier
         had, barrier.has_recorder = barrier.has_recorder, self._around.has_recorder()
+        if barrier.has_recorder and not had:
+            self._recorded_at = now
         if barrier.has_recorder and self._recorder_is_missed:
             self._recorder_is_missed = False
-            self._publish(topics.EVENTS.name, self.simulation.warning("recorded again", topics.PROGRESS.name))
+            self._warn_of_recorder("recorded again")
         elif had and not barrier.has_recorder:
             self._recorder_is_missed, barrier.recorded = True, None
             ends = self._parameters.on_recorder_loss == "end"
             text = f"the recorder is gone: the run {'ends' if ends else 'goes on unrecorded'} (on_recorder_loss)"
             self._troubles[text] = None
-            self._publish(topics.EVENTS.name, self.simulation.warning(text, topics.PROGRESS.name))
+            self._warn_of_recorder(text)
             if ends:
                 self._report("ended", self._reported)
                 raise RecorderLostError(f"{text}; {self.simulation.plant.tick} ticks flown")
+
+    def _look_for_stall(self, now: float) -> None:
+        """Warn of a recorder that is waited for and makes no progress."""
+        if now - self._recorded_at > STALLED and not self._stall:
+            recorded = (self.simulation.barrier.recorded or 0) / NANOSECONDS
+            self._stall = f"{RECORDER} records nothing after {recorded:g} s, and the run waits for it"
+            self._troubles[self._stall] = None
+            self._warn_of_recorder(self._stall)
+
+    def _warn_of_recorder(self, text: str) -> None:
+        self._publish(topics.EVENTS.name, self.simulation.warning(text, topics.PROGRESS.name))
 
     def _begin_if_all_are_there(self, now: float) -> None:
         missing = ", ".join(self._missing(now))
@@ -188,12 +210,9 @@ class PlantExecutive:
             if is_shared(publishers) or contradicts or now - since > LINGERING:
                 found.append(f"{topic} has several publishers: {names_of(publishers)}")
         for trouble in found:
-            self._note_trouble(trouble)
-
-    def _note_trouble(self, trouble: str) -> None:
-        if trouble not in self._troubles:
-            self._troubles[trouble] = None
-            self._publish(topics.EVENTS.name, self.simulation.warning(trouble))
+            if trouble not in self._troubles:
+                self._troubles[trouble] = None
+                self._publish(topics.EVENTS.name, self.simulation.warning(trouble))
 
     def _absent(self) -> list[str]:
         return [topic for topic, _ in self.simulation.answers() if not self._around.publishers_of(topic)]
@@ -217,9 +236,7 @@ class PlantExecutive:
             return
         if RECORDER in decision.waiting_for:
             self._say(f"waiting for {RECORDER}, which lags behind")
-            if now - self._recorded_at > STALLED:
-                recorded = (self.simulation.barrier.recorded or 0) / NANOSECONDS
-                self._note_trouble(f"{RECORDER} records nothing after {recorded:g} s; the run waits for it")
+            self._look_for_stall(now)
         elif decision.waiting_for:
             self._say(f"waiting for the first answer of {', '.join(decision.waiting_for)}")
 

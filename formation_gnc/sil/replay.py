@@ -1,15 +1,16 @@
 """Runs recorded inputs through modules again: the same parameters give the recorded outputs, bit for bit.
 
 What flew is taken from the bag alone. Parameters are its metadata records `parameters NODE`; changes in flight
-are either scheduled there, or are the `/events` of kind PARAMETERS and are committed again at their tick. A
-module is given an input only where it was given it in the recorded run, as its `timing` records; one that had
-been started again, whose messages are numbered from 1 again, is here too, with the parameters that it was
-started with then, `parameters NODE from STAMP` (:mod:`formation_gnc.sil.starts`).
+are either scheduled there, or are the `/events` of kind PARAMETERS and are committed again at their tick (those of
+kinds ASSIGNMENT and MODE come about by themselves). A module is given an input only where it was given it in the
+recorded run, as its `timing` records; one that had been started again, whose messages are numbered from 1 again, is
+here too, with the parameters that it was started with then, `parameters NODE from STAMP`
+(:mod:`formation_gnc.sil.starts`).
 
 The truth is recorded, not flown: changed modules say what they would have commanded, and nothing answers them.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any
@@ -17,11 +18,11 @@ from typing import Any
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.flight import topics
 from formation_gnc.flight.graph import MODULES, ModuleInstance, Row, missing
-from formation_gnc.parameters import from_json, load
+from formation_gnc.parameters import dump, load, to_json
 from formation_gnc.recording.reader import Bag
 from formation_gnc.records import EstimateStatus, Event, EventKind, Timing
 from formation_gnc.sil.simulation import Sink
-from formation_gnc.sil.starts import Decode, Start, node_name, timed_node
+from formation_gnc.sil.starts import Decode, Start, node_name, parsed, timed_node
 from formation_gnc.types import NANOSECONDS
 
 Copy = Callable[[str, bytes, int], None]
@@ -82,12 +83,13 @@ class ReplayedModule:
         """Outputs by topic at a tick on which `swaps` of parameters were recorded."""
         module = self.instance.module
         due = module.scheduled_changes(stamp)
-        for swap in swaps:
+        for swap in _in_order(swaps, module.parameters):
             changes = {each.name: each.new_value for each in swap.changes}
             if changes in due:
                 due.remove(changes)  # the schedule brings it about by itself
             else:
-                module.commit(module.stage(_values(swap, changes)))
+                words = f"{swap.node}: a change recorded at tick {swap.tick} is"
+                module.commit(module.stage(parsed(changes, words)))
         return self.instance.respond(inputs)
 
     def answer_unheard(self, stamp: int) -> dict[str, Any]:
@@ -100,12 +102,15 @@ class ReplayedModule:
         return outputs
 
 
-def _values(swap: Event, changes: Mapping[str, str]) -> dict[str, Any]:
-    """New values of a recorded change; raises ConfigurationError for values that are no JSON."""
-    try:
-        return {name: from_json(text) for name, text in changes.items()}
-    except ValueError as error:
-        raise ConfigurationError(f"{swap.node}: a change recorded at tick {swap.tick} is no JSON ({error})") from None
+def _in_order(swaps: Sequence[Event], parameters: Any) -> Iterator[Event]:
+    """Changes of one tick in the order in which they were made: each begins with what those before it left."""
+    values, waiting = {name: to_json(value) for name, value in dump(parameters).items()}, list(swaps)
+    while waiting:
+        follows = (all(values.get(one.name) == one.old_value for one in each.changes) for each in waiting)
+        place = next((place for place, fits in enumerate(follows) if fits), 0)
+        swap = waiting.pop(place)
+        values |= {one.name: one.new_value for one in swap.changes}
+        yield swap
 
 
 def has_flown(bag: Bag, node: str) -> bool:
@@ -143,9 +148,9 @@ def replay(
     given |= {topic.of(topics.deputy_of(node)) for node in starts for topic in MODULES[node_name(node)].gives}
     for node, own in starts.items():
         without = {each.topic.of(topics.deputy_of(node)) for each in MODULES[node_name(node)].takes_of_before} - given
+        if not own[0].values and not overrides.get(node):
+            raise ConfigurationError(f"{bag.path}: has no parameters of {node}; give them in a file")
         try:
-            if not own[0].values and not overrides.get(node):
-                raise ConfigurationError(f"{bag.path}: has no parameters of {node}; give them in a file")
             module = ReplayedModule(node, own, overrides.get(node, {}), without)
         except ConfigurationError as error:
             raise ConfigurationError(f"{node}: {error}") from None

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import Any
 
 from formation_gnc.errors import ConfigurationError
@@ -10,7 +11,10 @@ from formation_gnc.flight.graph import MODULES, modules_named
 from formation_gnc.parameters import OWN_OF_ROS, from_json
 from formation_gnc.recording.provenance import parameters_record
 from formation_gnc.recording.reader import Bag
-from formation_gnc.records import ParameterChange, Timing
+from formation_gnc.records import EventKind, ParameterChange, Timing
+
+CHANGES = frozenset({EventKind.PARAMETERS, EventKind.ASSIGNMENT, EventKind.MODE})
+"""Kinds of events by which a node changes its own parameters."""
 
 Decode = Callable[[str, bytes], Any]
 """The record of a message, given its topic and CDR bytes; None for one that no module takes."""
@@ -78,13 +82,13 @@ def timed_node(topic: str, timing: Timing | None) -> str:
 
 
 def _changes(bag: Bag, decode: Decode) -> dict[str, list[tuple[int, ParameterChange]]]:
-    """Changes of parameters in flight by node, with their stamps (ns), sorted."""
+    """Changes of parameters in flight by node, with their stamps (ns), in the order in which they were made."""
     found: dict[str, list[tuple[int, ParameterChange]]] = {}
-    events = topics.EVENTS.name
-    for stamp, topic, messages in bag.by_stamp([events] if events in bag.topics else []):
-        for event in (decode(topic, data) for data in messages):
-            if event is not None and event.changes:
-                found.setdefault(event.node, []).extend((stamp, each) for each in event.changes)
+    recorded = bag.messages([topics.EVENTS.name]) if topics.EVENTS.name in bag.topics else ()
+    for topic, data, stamp in sorted(recorded, key=itemgetter(2)):  # of one stamp as recorded
+        event = decode(topic, data)
+        if event is not None and event.kind in CHANGES and not event.subject.startswith("/"):
+            found.setdefault(event.node, []).extend((stamp, each) for each in event.changes)
     return found
 
 
@@ -100,8 +104,15 @@ def _first(changes: Sequence[tuple[int, ParameterChange]], start: int, end: int)
 def _values(bag: Bag, node: str, answer: int | None, before: Mapping[str, str]) -> dict[str, Any]:
     """Parameters at a start, given what was recorded after it and the values, JSON, before later changes."""
     recorded = bag.metadata.get(parameters_record(node, answer), {})
-    own = {name: before.get(name, text) for name, text in recorded.items() if not name.startswith(OWN_OF_ROS)}
+    own = {name: text for name, text in recorded.items() if not name.startswith(OWN_OF_ROS)}
+    values = parsed(own, f"{bag.path}: recorded parameters of {node} are")
+    changed = {name: text for name, text in before.items() if name in own}
+    return values | parsed(changed, f"{bag.path}: a recorded change of {node} is")
+
+
+def parsed(values: Mapping[str, str], words: str) -> dict[str, Any]:
+    """Values by name from JSON; raises ConfigurationError, with these words in front, for what is none."""
     try:
-        return {name: from_json(text) for name, text in own.items()}
+        return {name: from_json(text) for name, text in values.items()}
     except ValueError as error:
-        raise ConfigurationError(f"{bag.path}: recorded parameters of {node} are no JSON ({error})") from None
+        raise ConfigurationError(f"{words} no JSON ({error})") from None

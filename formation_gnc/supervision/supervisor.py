@@ -146,7 +146,7 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         self.begin_tick(time)
         before = self._before
         if before is None and status is not None and status.mode in Mode:
-            self._mode = self._in_force = Mode(status.mode)
+            self._adopt(time, Mode(status.mode))
         triggers = self._events(estimate, target)
         if self.parameters.enabled and (before is not None or estimate is not None):
             self._judge(time, before, estimate, target, status, thrust)
@@ -237,9 +237,7 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         elif self._is_fix_due(time):
             self._await_fix(time)
         self._in_force = before
-        if self.parameters.mode != self._mode:
-            parameters = change(self.parameters, {"mode": str(self._mode)})
-            self.configuration = replace(self.configuration, parameters=parameters)
+        self._follow_mode()
         force = NO_FORCE if self._evasion is None else self._evasion.force(time + self.parameters.tick_ns)
         return ModeState(
             time, str(self._mode), str(before), self._since, self._reason, force, self._restricted.restrictions
@@ -266,8 +264,27 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         if self._mode in EVASIVE:
             self._evasion = self._way_out(time, estimate, target)
             detail += f"; {self._evasion.words}"
-        change_of_mode = ParameterChange("mode", to_json(str(before)), to_json(str(self._mode)))
-        self.log(time, EventKind.MODE, detail, str(self._mode), [change_of_mode])
+        self._log_mode(time, detail)
+
+    def _adopt(self, time: int, mode: Mode) -> None:
+        """Go on in the mode in which the others fly, of a supervisor that is no more."""
+        if mode is not self._mode:
+            self._mode = mode
+            self._log_mode(time, "adopted: the supervisor was started in flight")
+            self._follow_mode()
+        self._in_force = mode
+
+    def _log_mode(self, time: int, detail: str) -> None:
+        """Log the mode, as a change of its parameter where it is one."""
+        before, after = str(self.parameters.mode), str(self._mode)
+        changes = [ParameterChange("mode", to_json(before), to_json(after))] if after != before else []
+        self.log(time, EventKind.MODE, detail, after, changes)
+
+    def _follow_mode(self) -> None:
+        """Let the parameter be the mode."""
+        if self.parameters.mode != self._mode:
+            parameters = change(self.parameters, {"mode": str(self._mode)})
+            self.configuration = replace(self.configuration, parameters=parameters)
 
     def _is_fix_due(self, time: int) -> bool:
         """Whether sensors contradict the state in `safe`, and it was not begun anew since the last thrust."""

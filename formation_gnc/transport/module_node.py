@@ -36,7 +36,7 @@ class ModuleNode(ConfiguredNode):
     that no answer waits for it, and takes effect at the next tick; it is answered when that is settled, with
     the reason if it is rejected.
 
-    A node that comes late, or has been busy, finds several messages, and goes on with one of them (:class:`Backlog`).
+    A node that comes late, or has been busy, may find several ticks waiting; :class:`Backlog` decides where it resumes.
     """
 
     def __init__(self, row: Row, bus: IntraProcessBus | None = None) -> None:

@@ -25,7 +25,7 @@ LONGEST_END = 10.0
 """Wall time (s) that a node has to leave the graph."""
 
 HUNG = 5.0
-"""Wall time (s) beyond it after which the middleware holds the interpreter itself, and nothing here runs any more."""
+"""Wall time (s) beyond LONGEST_END after which the middleware holds the interpreter, and none of its threads runs."""
 
 _stop_signals: list[int] = []
 """Plain list: signal handlers must not lock."""
@@ -53,7 +53,7 @@ def leave(status: int) -> NoReturn:
     for one another for ever.
     """
     for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError, ValueError):  # a terminal that was closed
+        with suppress(AttributeError, OSError, ValueError):  # a terminal that was closed, or none
             stream.flush()
     os._exit(status)
 
@@ -69,7 +69,8 @@ def run[E: Executable](make: Callable[[], E], work: Callable[[E], None] | None =
         work: what it does until its end; its `spin` by default.
 
     The exit status is 0 after an ordinary end or an interruption, 1 when a satellite came down, the recorder is lost,
-    the disk failed or the middleware hangs at the end, 2 when something given to the node is not allowed.
+    the disk failed or the middleware holds the interpreter at the end, 2 when something given to the node is not
+    allowed.
     """
     node, status = None, 1
     name = Path(sys.argv[0]).name
@@ -91,7 +92,8 @@ def run[E: Executable](make: Callable[[], E], work: Callable[[E], None] | None =
     watchdog = Timer(LONGEST_END, os._exit, (status,))
     watchdog.daemon = True
     watchdog.start()
-    faulthandler.dump_traceback_later(LONGEST_END + HUNG, exit=True)  # from a thread that needs no interpreter
+    with suppress(OSError, RuntimeError, ValueError):  # no standard error to write to
+        faulthandler.dump_traceback_later(LONGEST_END + HUNG, exit=True)  # from a thread that needs no interpreter
     try:
         if node is not None:
             node.destroy_node()

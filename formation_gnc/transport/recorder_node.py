@@ -30,6 +30,9 @@ from formation_gnc.types import NANOSECONDS
 LOOK_PERIOD = 0.1
 """Wall time (s) between looks for new topics and nodes, and between reports of progress."""
 
+LONGEST_TICK = 5.0
+"""Wall time (s) without progress after which what is lacking does not just take its time."""
+
 QUIET = 0.2
 """Wall time (s) without a message, while spinning, after which a stopping recorder has drained its queues."""
 
@@ -59,8 +62,8 @@ class RecorderNode(ConfiguredNode):
         if directory != wanted:
             self.warn(topics.PROGRESS.name, f"{wanted} exists already: recording to {directory}")
         self._diagnostics = DiagnosticsPublisher(self, self.full_name("") or "/")
-        self._diagnosed = NONE
-        """Stamp (ns) up to which all was recorded at the last diagnosis."""
+        self._latest, self._progressed = NONE, monotonic()
+        """Stamp (ns) up to which all is recorded, and since when (s of a monotonic clock) no more was."""
         self.create_wall_timer(PERIOD, self._diagnose)
         self._raw_topics = RawTopics(self, self._open, self.full_name(""))
         self._reader = ParameterReader(self)
@@ -103,15 +106,17 @@ class RecorderNode(ConfiguredNode):
     def _diagnose(self) -> None:
         failure, lost, stamp = self.session.failure, self.session.lost, self.session.progress.stamp
         level, message = DiagnosticStatus.OK, "recording"
-        if lost:
+        lacking, now = self.session.progress.lacking, monotonic()
+        if stamp != self._latest or not lacking:
+            self._latest, self._progressed = stamp, now
+        if now - self._progressed > LONGEST_TICK:
+            level, message = DiagnosticStatus.WARN, f"waiting for {' and '.join(lacking)}"
+        elif lost:
             level, message = DiagnosticStatus.WARN, "messages were lost"
         elif stamp < 0:
             level, message = DiagnosticStatus.WARN, "waiting for a run"
-        elif stamp == self._diagnosed and (lacking := self.session.progress.lacking):
-            level, message = DiagnosticStatus.WARN, f"waiting for {' and '.join(lacking)}"
         if failure is not None:
             level, message = DiagnosticStatus.ERROR, str(failure)
-        self._diagnosed = stamp
         values = {"bag": self.session.bag.directory, "recorded_to": max(0, stamp) / NANOSECONDS, "lost": lost}
         self._diagnostics.publish(level, message, values, stamp)
 

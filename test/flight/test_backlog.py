@@ -1,4 +1,4 @@
-"""Which ticks a module answers that comes into a flight going on, or has been busy."""
+"""Which ticks a module answers that joins a flight in progress, or has been busy."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -89,14 +89,14 @@ def test_what_was_before_its_start_may_come_in_parts(name: str, part: int) -> No
     flight.receive(20, START + 1)
     flight.wait()
     assert flight.answered[-1] == 20
-    assert set(flight.answered) <= {4 + part, 19, 20}, "no tick that had been over before it started"
+    assert set(flight.answered) <= {4 + part, 19, 20}, "of each part no tick but its last"
     assert flight.answered == sorted(flight.answered)
 
 
 def test_it_goes_on_soon_after_a_message_from_after_its_start() -> None:
     flight = Flight("controller")
     flight.receive(5, START - TICK)
-    flight.now += LATE
+    flight.now += LATE - 1  # in time, but behind what waits
     flight.receive(6, START)
     assert flight.backlog.due == flight.now + SETTLING
     flight.wait()

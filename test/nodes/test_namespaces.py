@@ -1,5 +1,7 @@
 """Formations in namespaces of one ROS domain fly beside one another, each recorded by its own names."""
 
+import time
+
 import pytest
 
 from formation_gnc.flight import topics
@@ -31,7 +33,7 @@ def fly(bench: Bench, nodes: list[ConfiguredNode]) -> None:
     def is_over() -> bool:
         for plant in plants:
             plant.executive.check(0.0)
-        return all(plant.executive.finished and plant.executive.recorder_is_done() for plant in plants)
+        return all(plant.executive.finished and plant.executive.recorder_is_done(time.monotonic()) for plant in plants)
 
     bench.spin(*nodes, until=is_over)
 

@@ -1,5 +1,7 @@
 """What other nodes publish on topics of a flight is withstood: the flight and its bag are those of the flight alone."""
 
+import time
+
 import pytest
 import rclpy
 from rclpy.node import Node
@@ -78,7 +80,7 @@ def test_a_bag_played_into_a_flight_changes_nothing_and_is_named(
                 bench.spin(until=lambda: plant.count_publishers(names[0]) > 1)
                 joined = True
                 executive.check(now)
-            return executive.finished and executive.recorder_is_done()
+            return executive.finished and executive.recorder_is_done(time.monotonic())
 
         bench.spin(*nodes, until=is_over)
     finally:

@@ -168,10 +168,26 @@ def test_a_recorder_that_lags_holds_the_plant_and_is_named(complete: Graph) -> N
     for now in (STALLED, STALLED + 1.0, STALLED + 2.0):
         executive.check(now)
     (warning,) = complete.events(EventKind.WARNING)
-    assert warning.detail == "/recorder records nothing after 0 s; the run waits for it"
+    assert warning.detail == "/recorder records nothing after 0 s, and the run waits for it"
     assert complete.reports[-1].troubles == (warning.detail,)
     executive.recorded(RECORDER_LAG * 10**9, STALLED + 3.0)
     assert executive.simulation.plant.tick == RECORDER_LAG + 2
+    assert complete.events(EventKind.WARNING)[-1].detail == "/recorder records again"
+    executive.check(STALLED + 4.0)
+    assert complete.reports[-1].troubles == ()
+
+
+def test_a_recorder_that_has_just_come_is_given_its_time(complete: Graph) -> None:
+    executive = start(complete, ticks=3 * RECORDER_LAG, on_recorder_loss="continue")
+    for _ in range(2 * RECORDER_LAG):
+        answer(executive, 0.0)
+    complete.recorder = True
+    for now in np.arange(100.0, 100.0 + STALLED, 0.1):
+        executive.check(float(now))
+    assert complete.said[-1] == "waiting for /recorder, which lags behind"
+    assert not complete.events(EventKind.WARNING)
+    executive.check(100.2 + STALLED)
+    assert len(complete.events(EventKind.WARNING)) == 1
 
 
 @pytest.mark.parametrize("choice", ["continue", "end"])
@@ -203,13 +219,17 @@ def test_the_plant_stays_until_the_recorder_has_its_end(complete: Graph) -> None
     executive = start(complete)
     for _ in range(TICKS):
         answer(executive, 0.0)
-    assert executive.recorder_is_done(), "without a recorder nobody waits"
+    assert executive.recorder_is_done(0.0), "without a recorder nobody waits"
     complete.recorder = True
-    assert not executive.recorder_is_done()
+    assert not executive.recorder_is_done(0.0)
     executive.recorded((TICKS - 1) * 10**9, 0.0)
-    assert not executive.recorder_is_done(), "the last tick, but not the end"
+    assert not executive.recorder_is_done(STALLED), "the last tick, but not the end"
+    assert not complete.events(EventKind.WARNING)
+    assert not executive.recorder_is_done(STALLED + 0.1)
+    (warning,) = complete.events(EventKind.WARNING)
+    assert warning.detail == f"/recorder records nothing after {TICKS - 1} s, and the run waits for it"
     executive.recorded(TICKS * 10**9, 0.0)
-    assert executive.recorder_is_done()
+    assert executive.recorder_is_done(0.0)
 
 
 def test_the_pace_decides_when_the_next_check_is(complete: Graph) -> None:

@@ -16,7 +16,7 @@ class Node:
     def destroy_node(self):
         {destroy}
 
-process.LONGEST_END, process.HUNG = 0.2, 0.2
+process.LONGEST_END, process.HUNG = 0.2, 5.0
 process.run(Node)
 """
 
