@@ -46,8 +46,7 @@ def test_nodes_started_by_hand_in_any_order_fly_and_swap_the_law_in_flight(desk:
     kinds = ["plant", "recorder", *PARTS]
     random.shuffle(kinds)
     terminals = {kind: desk.start(kind, by_hand=True, **options.get(kind, {})) for kind in kinds}
-    wait_until(lambda: "acquired" in terminals["navigation"].text, f"the first estimate of {kinds}")
-    time.sleep(1.0)
+    wait_until(lambda: has_messages(bag, "/deputy1/thrust", 20), f"the first commands of {kinds}")
     accepted, reason = set_parameter(desk.domain, "/deputy1/controller", "algorithm", "coast")
     assert accepted, reason
     rejected, reason = set_parameter(desk.domain, "/deputy1/controller", "algorithm", "magic")
