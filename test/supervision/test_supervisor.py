@@ -8,7 +8,7 @@ import pytest
 
 from formation_gnc.errors import ConfigurationError
 from formation_gnc.mode_records import NO_FORCE, HealthReport, ModeState, RestrictionKind
-from formation_gnc.records import EstimateStatus, Event, EventKind, Innovation, Rejection, Separation
+from formation_gnc.records import EstimateStatus, Event, EventKind, Innovation, ParameterChange, Rejection, Separation
 from formation_gnc.supervision.supervisor import Supervisor
 from formation_gnc.types import NANOSECONDS, Vector
 
@@ -52,6 +52,11 @@ def test_the_formation_is_kept_once_the_target_is_reached() -> None:
     assert tick(module, 3)[0].mode == "keep"
     assert tick(module, 4, estimate={"relative_state": OFF})[0].mode == "acquire"
     assert module.parameters.mode == "acquire"
+    changes = [each.changes for each in module.take_events() if each.kind == EventKind.MODE]
+    assert changes == [
+        [ParameterChange("mode", '"acquire"', '"keep"')],
+        [ParameterChange("mode", '"keep"', '"acquire"')],
+    ]
 
 
 def test_a_command_takes_effect_at_the_next_tick_and_is_an_event() -> None:
@@ -135,8 +140,12 @@ def test_records_of_the_tick_before_are_there_unless_it_was_missed() -> None:
 
 
 def test_one_started_again_goes_on_with_the_mode_that_is_obeyed() -> None:
-    state, _ = tick(supervisor(), 20, status={"mode": "safe"})
+    module = supervisor()
+    state, _ = tick(module, 20, status={"mode": "safe"})
     assert (state.previous, state.mode) == ("safe", "safe")
+    (adopted,) = [each for each in module.take_events() if each.kind == EventKind.MODE]
+    assert adopted.changes == [ParameterChange("mode", '"acquire"', '"safe"')]
+    assert module.parameters.mode == "safe"
 
 
 def test_a_reconfiguration_has_a_mode_of_its_own() -> None:
