@@ -5,6 +5,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from formation_gnc.mode_records import Mode as Mode
+from formation_gnc.types import Vector
+
+LEFT = 1.5
+"""Control error, over the tube, beyond which the target counts as left."""
 
 
 class Trigger(StrEnum):
@@ -166,6 +170,15 @@ def step(mode: Mode, triggers: Collection[Trigger]) -> Step:
             reason = REFUSALS.get((mode, each), f"overruled by {decisive}, which leads to {after}")
             refusals.append((each, reason))
     return Step(after, decisive, tuple(refusals))
+
+
+def by_error(error: Vector, tube: float) -> list[Trigger]:
+    """Whether the target is reached or left, by the control error (3,) and the radius of the tube, m."""
+    x, y, z = error.tolist()
+    square = x * x + y * y + z * z
+    if square <= tube * tube:
+        return [Trigger.TARGET_REACHED]
+    return [] if square <= (LEFT * tube) ** 2 else [Trigger.TARGET_LEFT]  # left also where it is NaN
 
 
 def refusal(mode: Mode, wanted: Mode) -> str:

@@ -21,7 +21,7 @@ from formation_gnc.records import (
 )
 from formation_gnc.supervision.fault_table import Entry, Response
 from formation_gnc.supervision.health import Health
-from formation_gnc.supervision.modes import COMMANDS, FAULTS, Step, Trigger, refusal, step
+from formation_gnc.supervision.modes import COMMANDS, FAULTS, Step, Trigger, by_error, refusal, step
 from formation_gnc.supervision.monitor import Level, Verdict
 from formation_gnc.supervision.parameters import SupervisorParameters
 from formation_gnc.supervision.registry import read_fault_table
@@ -34,9 +34,6 @@ from formation_gnc.supervision.responses import (
     restricted,
 )
 from formation_gnc.supervision.safe import Coast, Evasion, Manoeuvre, plan_evasion
-
-LEFT = 1.5
-"""Control error, over the tube, beyond which the target counts as left."""
 
 QUIET = 60
 """Ticks without a failure after which the next one is reported again."""
@@ -51,6 +48,7 @@ SEPARATION = "separation"
 """Monitor by which `avoid` ends."""
 
 type Design = tuple[Entry, ...]
+type Configured = Configuration[SupervisorParameters, Design]
 
 _decide = cache(step)
 """The same triggers come at tick after tick."""
@@ -88,11 +86,11 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         """The fault table; raises ConfigurationError for one that is not allowed."""
         return read_fault_table(parameters)
 
-    def check_staged(self, staged: Configuration[SupervisorParameters, Design]) -> None:
+    def check_staged(self, staged: Configured) -> None:
         """Refuse a mode that may not be commanded now."""
         self._check_command(staged)
 
-    def check_due(self, time: int, due: Configuration[SupervisorParameters, Design]) -> None:
+    def check_due(self, time: int, due: Configured) -> None:
         """Refuse a mode that may not be commanded at its tick."""
         self._check_command(due)
 
@@ -104,18 +102,14 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         """Whether the tick before was answered: an acquisition fix comes when it was not."""
         return not pacing.fix_available
 
-    def _check_command(self, wanted: Configuration[SupervisorParameters, Design]) -> None:
+    def _check_command(self, wanted: Configured) -> None:
         if "mode" not in wanted.changes:
             return
         mode = Mode(wanted.changes["mode"])
         if mode is not self._mode and (reason := refusal(self._mode, mode)):
             raise ConfigurationError(f"mode {mode}: refused in {self._mode}; {reason}")
 
-    def activate(
-        self,
-        old: Configuration[SupervisorParameters, Design],
-        new: Configuration[SupervisorParameters, Design],
-    ) -> None:
+    def activate(self, old: Configured, new: Configured) -> None:
         """Take a command; begin anew with other monitors or another table."""
         if "mode" in new.changes and new.parameters.mode != self._mode:
             self._command = COMMANDS[Mode(new.parameters.mode)]
@@ -264,27 +258,22 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
         if self._mode in EVASIVE:
             self._evasion = self._way_out(time, estimate, target)
             detail += f"; {self._evasion.words}"
-        self._log_mode(time, detail)
+        self.log(time, EventKind.MODE, detail, str(self._mode), self._follow_mode())
 
     def _adopt(self, time: int, mode: Mode) -> None:
         """Go on in the mode in which the others fly, of a supervisor that is no more."""
-        if mode is not self._mode:
-            self._mode = mode
-            self._log_mode(time, "adopted: the supervisor was started in flight")
-            self._follow_mode()
-        self._in_force = mode
+        self._mode = self._in_force = mode
+        if changes := self._follow_mode():
+            self.log(time, EventKind.MODE, "adopted: the supervisor was started in flight", str(mode), changes)
 
-    def _log_mode(self, time: int, detail: str) -> None:
-        """Log the mode, as a change of its parameter where it is one."""
+    def _follow_mode(self) -> list[ParameterChange]:
+        """Let the parameter be the mode; returns its change, if it is one."""
         before, after = str(self.parameters.mode), str(self._mode)
-        changes = [ParameterChange("mode", to_json(before), to_json(after))] if after != before else []
-        self.log(time, EventKind.MODE, detail, after, changes)
-
-    def _follow_mode(self) -> None:
-        """Let the parameter be the mode."""
-        if self.parameters.mode != self._mode:
-            parameters = change(self.parameters, {"mode": str(self._mode)})
-            self.configuration = replace(self.configuration, parameters=parameters)
+        if after == before:
+            return []
+        parameters = change(self.parameters, {"mode": after})
+        self.configuration = replace(self.configuration, parameters=parameters)
+        return [ParameterChange("mode", to_json(before), to_json(after))]
 
     def _is_fix_due(self, time: int) -> bool:
         """Whether sensors contradict the state in `safe`, and it was not begun anew since the last thrust."""
@@ -320,13 +309,8 @@ class Supervisor(FlightModule[SupervisorParameters, Design]):
             triggers.append(Trigger.RECONFIGURATION_BEGAN)
         elif self._mode is Mode.RECONFIGURE:
             triggers.append(Trigger.RECONFIGURATION_ENDED)
-        dx, dy, dz = (estimate.relative_state[:3] - target.relative_state[:3]).tolist()
-        square, tube = dx * dx + dy * dy + dz * dz, self.parameters.tube
-        if square <= tube * tube:
-            triggers.append(Trigger.TARGET_REACHED)
-        elif not square <= (LEFT * tube) ** 2:  # true for NaN
-            triggers.append(Trigger.TARGET_LEFT)
-        return triggers
+        error = estimate.relative_state[:3] - target.relative_state[:3]
+        return [*triggers, *by_error(error, self.parameters.tube)]
 
     def _is_restored(self, target: Target | None) -> bool:
         """Whether a prediction made after the last burn is above the limit."""
