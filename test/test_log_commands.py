@@ -189,13 +189,13 @@ def test_scheduled_and_manual_changes_replay_at_their_tick(tmp_path: Path, capsy
     assert list(Bag(bag).arrays("/events")["kind"]).count(EventKind.PARAMETERS) == 3
     # without the schedule in the parameters, the same changes are manual ones
     recorded = Bag(bag)
-    starts = starts_of(recorded, nodes_of(recorded, list(MODULES)), reader(recorded))
+    nodes = nodes_of(recorded, list(MODULES))
+    starts = starts_of(recorded, nodes, reader(recorded), {node: {"schedule": ()} for node in nodes})
     copied: list[tuple[str, int]] = []
     outputs: list[tuple[str, Any]] = []
     replay(
         recorded,
         starts,
-        {node: {"schedule": ()} for node in starts},
         reader(recorded),
         lambda topic, record: outputs.append((topic, record)),
         lambda topic, data, stamp: copied.append((topic, stamp)),

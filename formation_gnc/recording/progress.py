@@ -11,6 +11,9 @@ from formation_gnc.records import Event, EventKind
 NONE = -1
 """Stamp before the first tick."""
 
+LONGEST_TICK = 5.0
+"""Wall time (s) without progress after which what is lacking does not just take its time."""
+
 
 class RecordingProgress:
     """Stamp up to which all messages of the plant and all answers of the deputies, or their misses, are recorded.
@@ -23,6 +26,8 @@ class RecordingProgress:
         """Start with nothing recorded."""
         self._answer_names = tuple(row.answer.name for row in GRAPH)
         self._commanding = frozenset(row.answer.name for row in commanding())
+        self._looked_at: tuple[int, float] | None = None
+        """Stamp (ns) when it was last asked what is awaited, and the wall time (s) from which it has been that."""
         self.reset()
 
     def reset(self) -> None:
@@ -67,7 +72,7 @@ class RecordingProgress:
         for topic in self._plant:
             deputy = topics.deputy_of(topic)
             if deputy:
-                stamps.add(self._recorded_of(deputy))
+                stamps.add(min(self._recorded_of(deputy).values()))
         recorded = min(stamps, default=NONE)
         return self._end if len(stamps) == 1 and self._end > recorded else recorded
 
@@ -77,24 +82,24 @@ class RecordingProgress:
         latest = max(self._plant.values(), default=NONE)
         found = [topic for topic, stamp in self._plant.items() if stamp < latest]
         for deputy in filter(None, map(topics.deputy_of, self._plant)):
-            missed = self._missed.get(deputy, NONE)
-            for name, stamp in self._answers_of(deputy).items():
-                if self._counts(name, stamp, missed) and max(stamp, missed) < latest:
-                    found.append(f"/{deputy}/{name}")
+            found += [f"/{deputy}/{name}" for name, stamp in self._recorded_of(deputy).items() if stamp < latest]
         return found
 
-    def _recorded_of(self, deputy: str) -> int:
-        """Stamp (ns) up to which a deputy has answered or missed.
+    def awaited(self, now: float) -> list[str]:
+        """Topics that have held the recording up for long; called now and then, with the wall time (s)."""
+        stamp, lacking = self.stamp, self.lacking
+        if self._looked_at is None or stamp != self._looked_at[0] or not lacking:
+            self._looked_at = stamp, now
+        return lacking if now - self._looked_at[1] > LONGEST_TICK else []
+
+    def _recorded_of(self, deputy: str) -> dict[str, int]:
+        """Stamps (ns) up to which a deputy has answered or missed, by the names of the answers that count.
 
         A module that the plant does not wait for may fall silent: it counts no more once a tick was missed since.
         """
         missed = self._missed.get(deputy, NONE)
         answers = self._answers_of(deputy).items()
-        return max(min(stamp for name, stamp in answers if self._counts(name, stamp, missed)), missed)
-
-    def _counts(self, name: str, stamp: int, missed: int) -> bool:
-        """Whether an answer is waited for, given its latest stamp and that of the latest miss, ns."""
-        return name in self._commanding or stamp >= missed
+        return {name: max(stamp, missed) for name, stamp in answers if name in self._commanding or stamp >= missed}
 
     def _answers_of(self, deputy: str) -> dict[str, int]:
         answers = self._answers.get(deputy)

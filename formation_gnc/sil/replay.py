@@ -32,15 +32,12 @@ Copy = Callable[[str, bytes, int], None]
 class ReplayedModule:
     """One module, run again; started again where it had been in the recorded run."""
 
-    def __init__(
-        self, node: str, starts: Sequence[Start], overrides: Mapping[str, Any], without: Collection[str] = ()
-    ) -> None:
+    def __init__(self, node: str, starts: Sequence[Start], without: Collection[str] = ()) -> None:
         """Build it as it was first started; raises ConfigurationError for what cannot be flown.
 
         Args:
             node: its full name.
             starts: its starts in the recorded run, sorted.
-            overrides: parameters that are not as they were.
             without: full names of dispensable topics that neither the bag nor the replay has.
         """
         self.without = without
@@ -50,7 +47,7 @@ class ReplayedModule:
         """Parameters by the stamps of the first ticks of its processes."""
         for start in starts:
             if start.values or not self.starts:
-                latest = load(self.row.parameters, {**start.values, **overrides})
+                latest = load(self.row.parameters, start.values)
             self.starts[start.stamp] = latest
         self.answer, self.timing = self.row.answer.of(self.deputy), topics.TIMING.of(self.deputy)
         self.orphans = 0
@@ -122,7 +119,6 @@ def has_flown(bag: Bag, node: str) -> bool:
 def replay(
     bag: Bag,
     starts: Mapping[str, Sequence[Start]],
-    overrides: Mapping[str, Mapping[str, Any]],
     decode: Decode,
     sink: Sink,
     copy: Copy,
@@ -132,7 +128,6 @@ def replay(
     Args:
         bag: the recorded run.
         starts: of every node to replay, by full name, in the order of `nodes_of`.
-        overrides: parameters of nodes that are not as they were, at any start.
         decode: makes records of messages.
         sink: takes topic and record of all that the modules publish.
         copy: takes every other message as it was recorded, sorted by stamp.
@@ -148,10 +143,10 @@ def replay(
     given |= {topic.of(topics.deputy_of(node)) for node in starts for topic in MODULES[node_name(node)].gives}
     for node, own in starts.items():
         without = {each.topic.of(topics.deputy_of(node)) for each in MODULES[node_name(node)].takes_of_before} - given
-        if not own[0].values and not overrides.get(node):
+        if not own[0].values:
             raise ConfigurationError(f"{bag.path}: has no parameters of {node}; give them in a file")
         try:
-            module = ReplayedModule(node, own, overrides.get(node, {}), without)
+            module = ReplayedModule(node, own, without)
         except ConfigurationError as error:
             raise ConfigurationError(f"{node}: {error}") from None
         modules.append(module)

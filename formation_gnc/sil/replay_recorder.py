@@ -33,18 +33,16 @@ def replay_into(bag: Bag, output: Path, modules: Sequence[str] | None, parameter
     deputies, read = topics.deputies_in(bag.topics), reader(bag)
     nodes = nodes_of(bag, list(MODULES) if modules is None else modules)
     overrides = {node: given_to(parameter_file, node, deputies) for node in nodes} if parameter_file else {}
-    starts, remarks = starts_of(bag, nodes, read), []
+    starts, remarks = starts_of(bag, nodes, read, overrides), []
     for node in nodes:
-        if modules is None and not starts[node][0].values and not overrides.get(node) and not has_flown(bag, node):
+        if modules is None and not starts[node][0].values and not has_flown(bag, node):
             remarks.append(f"{node} is left out: the bag has neither parameters nor records of it")
             del starts[node]
     flown = {
-        parameters_record(node, start.answer): {
-            name: to_json(value) for name, value in {**start.values, **overrides.get(node, {})}.items()
-        }
+        parameters_record(node, start.answer): {name: to_json(value) for name, value in start.values.items()}
         for node, own in starts.items()
         for start in own
-        if start.values or start is own[0]
+        if start.values
     }
     origin = {"replay": {"source": bag.path.absolute().name, "nodes": ", ".join(starts)}}
     with BagWriter(output, bag.metadata | provenance() | flown | origin, bag.attachments) as writer:
@@ -52,7 +50,6 @@ def replay_into(bag: Bag, output: Path, modules: Sequence[str] | None, parameter
         return remarks + replay(
             bag,
             starts,
-            overrides,
             read,
             recorder,
             lambda topic, data, stamp: recorder.copy(bag, topic, data, stamp),

@@ -32,34 +32,42 @@ class Start:
     """Parameters by name; empty where the bag has none."""
 
 
-def starts_of(bag: Bag, nodes: Sequence[str], decode: Decode) -> dict[str, list[Start]]:
+def starts_of(
+    bag: Bag, nodes: Sequence[str], decode: Decode, overrides: Mapping[str, Mapping[str, Any]] | None = None
+) -> dict[str, list[Start]]:
     """Every start of nodes, by their full names, each list sorted and with the first start at its head.
 
     A recorder asks for parameters when it has heard a node answer; some may have changed by then. The event of such a
     change has the value before it, which is that of the start.
 
+    overrides: parameters of nodes that are not as they were, at any start whose parameters the bag has, and the first.
+
     Raises:
         ConfigurationError: recorded values that are no JSON.
     """
     answers = {node: MODULES[node_name(node)].answer.of(topics.deputy_of(node)) for node in nodes}
-    timings = sorted({topics.TIMING.of(topics.deputy_of(node)) for node in nodes})
-    answered = bag.restarts(list(answers.values()))
-    ticked = bag.restarts(timings, lambda topic, data: timed_node(topic, decode(topic, data)))
+    timings = {topics.TIMING.of(topics.deputy_of(node)) for node in nodes}
+    restarts = bag.restarts(
+        [*answers.values(), *sorted(timings)],
+        lambda topic, data: timed_node(topic, decode(topic, data)) if topic in timings else topic,
+    )
     changes = _changes(bag, decode)
     found: dict[str, list[Start]] = {}
     for node in nodes:
         begun: list[tuple[int, int | None]] = [(0, None)]
         before = -1
-        for answer in sorted(answered[answers[node]]):
+        for restart in sorted(restarts[answers[node]]):
             # Its first ticks may have had no answer: navigation without a fix to start from.
-            own = [stamp for stamp in ticked.get(node, ()) if before < stamp <= answer]
-            begun.append((max(own, default=answer), answer))
-            before = answer
+            own = [stamp for stamp in restarts.get(node, ()) if before < stamp <= restart]
+            begun.append((max(own, default=restart), restart))
+            before = restart
         ends = [stamp for stamp, _ in begun[1:]] + [2**64]
-        found[node] = [
-            Start(stamp, answer, _values(bag, node, answer, _first(changes.get(node, ()), stamp, end)))
-            for (stamp, answer), end in zip(begun, ends, strict=True)
-        ]
+        found[node] = []
+        for (stamp, answer), end in zip(begun, ends, strict=True):
+            values = _values(bag, node, answer, _first(changes.get(node, ()), stamp, end))
+            if values or not found[node]:
+                values |= (overrides or {}).get(node, {})
+            found[node].append(Start(stamp, answer, values))
     return found
 
 

@@ -14,7 +14,6 @@ from std_srvs.srv import Trigger
 from formation_gnc.flight import topics
 from formation_gnc.messages.conversion import codec
 from formation_gnc.recording.parameters import RecorderParameters
-from formation_gnc.recording.progress import NONE
 from formation_gnc.recording.provenance import provenance
 from formation_gnc.recording.session import RecordingSession
 from formation_gnc.recording.writer import FLUSH_INTERVAL, BagWriter, Split
@@ -29,9 +28,6 @@ from formation_gnc.types import NANOSECONDS
 
 LOOK_PERIOD = 0.1
 """Wall time (s) between looks for new topics and nodes, and between reports of progress."""
-
-LONGEST_TICK = 5.0
-"""Wall time (s) without progress after which what is lacking does not just take its time."""
 
 QUIET = 0.2
 """Wall time (s) without a message, while spinning, after which a stopping recorder has drained its queues."""
@@ -62,8 +58,6 @@ class RecorderNode(ConfiguredNode):
         if directory != wanted:
             self.warn(topics.PROGRESS.name, f"{wanted} exists already: recording to {directory}")
         self._diagnostics = DiagnosticsPublisher(self, self.full_name("") or "/")
-        self._latest, self._progressed = NONE, monotonic()
-        """Stamp (ns) up to which all is recorded, and since when (s of a monotonic clock) no more was."""
         self.create_wall_timer(PERIOD, self._diagnose)
         self._raw_topics = RawTopics(self, self._open, self.full_name(""))
         self._reader = ParameterReader(self)
@@ -106,11 +100,8 @@ class RecorderNode(ConfiguredNode):
     def _diagnose(self) -> None:
         failure, lost, stamp = self.session.failure, self.session.lost, self.session.progress.stamp
         level, message = DiagnosticStatus.OK, "recording"
-        lacking, now = self.session.progress.lacking, monotonic()
-        if stamp != self._latest or not lacking:
-            self._latest, self._progressed = stamp, now
-        if now - self._progressed > LONGEST_TICK:
-            level, message = DiagnosticStatus.WARN, f"waiting for {' and '.join(lacking)}"
+        if awaited := self.session.progress.awaited(monotonic()):
+            level, message = DiagnosticStatus.WARN, f"waiting for {' and '.join(awaited)}"
         elif lost:
             level, message = DiagnosticStatus.WARN, "messages were lost"
         elif stamp < 0:

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from formation_gnc.flight import topics
-from formation_gnc.recording.progress import RecordingProgress
+from formation_gnc.recording.progress import LONGEST_TICK, RecordingProgress
 from formation_gnc.records import Event, EventKind
 
 PLANT = (topics.CLOCK.name, topics.TRUTH.name)
@@ -45,6 +45,19 @@ def test_a_tick_is_recorded_when_its_last_message_has_come() -> None:
         progress.take(last, 1)
         assert progress.lacking == []
         assert progress.stamp == 1
+
+
+def test_what_holds_the_recording_up_is_awaited_once_it_has_for_long() -> None:
+    progress = recorded(0)
+    for topic in TICK:
+        if topic != ANSWERS[0]:
+            progress.take(topic, 1)
+    assert progress.awaited(10.0) == []
+    assert progress.awaited(10.0 + LONGEST_TICK) == []
+    assert progress.awaited(10.1 + LONGEST_TICK) == [ANSWERS[0]]
+    progress.take(ANSWERS[0], 1)
+    assert progress.awaited(100.0) == []
+    assert progress.awaited(200.0) == [], "nothing is lacking between two ticks, however long they are apart"
 
 
 def test_a_miss_counts_instead_of_the_answers() -> None:
