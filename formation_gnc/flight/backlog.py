@@ -20,13 +20,14 @@ LATE = 50_000_000
 class Backlog:
     """Decides with which of several ticks a module goes on: an answer to an older one would look like a new run.
 
-    What the module cannot start without is not skipped, if it was published after its start.
+    What the module cannot start without is not skipped, if it was published after its start. At the first two ticks
+    of a flight nor is what was before, by a module that may be a tick behind: others wait for its answer at the second.
     """
 
     def __init__(self, instance: ModuleInstance, started: int) -> None:
         """No messages; `started` is the wall time (ns) of the module's start."""
         self._instance, self._started = instance, started
-        self._pace = instance.needed[0]
+        self._pace, self._tick = instance.needed[0], instance.module.parameters.tick_ns
         self._waiting: dict[str, list[tuple[int, Any]]] = {}
         self._has_caught_up = self._is_addressed = False
         self._bygone: Any = None
@@ -61,17 +62,21 @@ class Backlog:
         self.due, waiting, self._waiting = None, self._waiting, {}
         records = {topic: _of_latest_run(messages) for topic, messages in waiting.items()}
         pacing = records.get(self._pace, [])
-        addressed = [record for published, record in pacing[:-1] if published >= self._started]
+        is_first = self._instance.synchronizer.may_lag and bool(pacing) and pacing[-1][1].time <= self._tick
+        addressed = [record for published, record in pacing[:-1] if is_first or published >= self._started]
         addressed += [record for _, record in pacing[-1:]]
         begun = self._instance.synchronizer.unanswered
-        if begun is not None and begun is not self._bygone and addressed and begun.time < addressed[0].time:
-            addressed.insert(0, begun)  # what it awaits may be among those that wait
-        if pacing and pacing[-1][0] < self._started:
+        if begun is not None and addressed and begun.time < addressed[0].time:
+            if begun is self._bygone:
+                self._instance.synchronizer.abandon()
+            else:
+                addressed.insert(0, begun)  # what it awaits may be among those that wait
+        if pacing and pacing[-1][0] < self._started and not is_first:
             self._bygone = pacing[-1][1]
         first = self._instance.module.first_of(addressed).time if addressed else 0
         kept = []
         for topic, messages in records.items():
-            begin = first - self._instance.module.parameters.tick_ns * (topic in self._instance.delayed)
+            begin = first - self._tick * (topic in self._instance.delayed)
             kept += [(topic, each) for _, each in messages if each.time >= begin]
         return sorted(kept, key=lambda each: (each[1].time, each[0] == self._pace))
 

@@ -1,6 +1,6 @@
 """Synchronization of several topics by stamp, never by order of arrival."""
 
-from collections import OrderedDict
+from collections import OrderedDict, deque
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -31,6 +31,8 @@ class InputTopics:
     """Whether there are delayed ones, by the pacing topic's record."""
     without: frozenset[str] = frozenset()
     """Delayed and optional topics that are always missing."""
+    may_lag: bool = False
+    """Whether a tick is waited for while the pacing topic is one further: nobody waits for the answer before then."""
 
 
 class StampSynchronizer:
@@ -40,9 +42,14 @@ class StampSynchronizer:
     one needed it counts as missing, and is not waited for; one with a record is. So a silent satellite delays the
     others by one tick, and is waited for again from the tick after it resumed, in whatever order records
     arrive. A pacing stamp that runs backwards starts a new run, with nothing missing. Before the first tick,
-    at 0, there is nothing, and nothing to wait for.
+    at 0, there is nothing, and nothing to wait for. A delayed topic that has come further without the record that is
+    awaited is missing.
 
-    Records are given one by one as they arrive (`take`), or all of a tick at once (`take_tick`).
+    The next stamp of the pacing topic ends the wait, and there is no answer; with `may_lag` the one after it does,
+    and the tick is answered without what is missing: every tick is answered.
+
+    Records are given one by one as they arrive (`take`, and `next` until there is no more), or all of a tick at once
+    (`take_tick`).
     """
 
     def __init__(self, topics: InputTopics) -> None:
@@ -59,7 +66,11 @@ class StampSynchronizer:
         self._forgone = _NONE
         """Topics that nobody publishes."""
         self._current: int | None = None
-        """Latest stamp of the pacing topic, ns."""
+        """Stamp of the pacing topic at which the others are awaited or were last returned, ns."""
+        self._ahead = deque[Stamped]()
+        """Later records of the pacing topic."""
+        self._lag = 1 if topics.may_lag else 0
+        """How many of those do not end the wait."""
         self._completed: int | None = None
         """Latest stamp at which all records were returned, ns."""
 
@@ -74,34 +85,59 @@ class StampSynchronizer:
         time, received = record.time, self._received[topic]
         if time < 0:
             return None
-        if received and time < _latest(received):
-            received.clear()
-        if topic == self._pacing and time != self._current:
+        if topic == self._pacing:
             if self._current is not None and time < self._current:
                 self._clear_after(time)
-            elif self._current is not None:
-                self._absent = frozenset(each for each in self._awaited if self._of(each, self._current) is None)
-            self._advance(record)
+                self._ahead.clear()
+                self._advance(record)
+            elif received and time <= _latest(received):
+                return None
+            else:
+                self._ahead.append(record)
+        elif received and time < _latest(received):
+            received.clear()
         received[time] = record
         if len(received) > HISTORY:
             received.popitem(last=False)
         self._forgone -= {topic}
-        return self._complete()
+        return self.next()
+
+    def next(self) -> Sequence[Any] | None:
+        """As `take`, without another record: of the stamp after one that was returned."""
+        while True:
+            records = self._complete()
+            is_late = len(self._ahead) > self._lag
+            if records is None and is_late and self._topics.may_lag:
+                records = self._complete(give_up=True)
+            if records is not None:
+                return records
+            if not self._ahead or (self.unanswered is not None and not is_late):
+                return None
+            if self._current is not None:
+                self._absent = frozenset(each for each in self._awaited if self._of(each, self._current) is None)
+            self._advance(self._ahead.popleft())
 
     def forgo(self, topics: Collection[str]) -> Sequence[Any] | None:
         """Do without dispensable topics until they are heard; returns as `take`, for the current stamp."""
         self._forgone |= frozenset(topics)
         self._missing |= frozenset(each for each in topics if not self._received[each])
-        return self._complete()
+        return self.next()
 
-    def _complete(self) -> Sequence[Any] | None:
-        """The records of the current stamp, once, when all are there."""
+    def abandon(self) -> None:
+        """Do not answer the current stamp."""
+        self._completed = self._current
+
+    def _complete(self, give_up: bool = False) -> Sequence[Any] | None:
+        """The records of the current stamp, once, when all are there that may still come; `give_up`: none may."""
         current = self._current
         if current is None or current == self._completed:
             return None
-        records = [None if each in self._missing else self._of(each, current) for each in self._received]
-        if records.count(None) > len(self._missing):
-            return None
+        missing = self._missing
+        records = [None if each in missing else self._of(each, current) for each in self._received]
+        if records.count(None) > len(missing):
+            missing |= frozenset(each for each in self._awaited if give_up or self._has_passed(each))
+            if any(each is None and name not in missing for each, name in zip(records, self._received, strict=True)):
+                return None
         self._completed = current
         return records
 
@@ -133,7 +169,8 @@ class StampSynchronizer:
             inputs = [sources.get(topic, records).get(topic) for topic in self._received]
             there = [topic for topic, each in zip(self._received, inputs, strict=True) if each is not None]
             self._absent = frozenset(self._awaited).difference(there)
-            if not self._missing.issuperset(self._received.keys() - there):
+            gone = frozenset(each for each in self._absent if topics.may_lag or (each in sources and each in records))
+            if not (self._missing | gone).issuperset(self._received.keys() - there):
                 return None
         if self._missing:
             return [
@@ -142,10 +179,22 @@ class StampSynchronizer:
         return inputs
 
     @property
+    def may_lag(self) -> bool:
+        """Whether a tick is waited for while the pacing topic is one further."""
+        return self._topics.may_lag
+
+    @property
     def unanswered(self) -> Any | None:
         """The pacing record of the current stamp while others are awaited; None for none."""
         current = self._current
         return None if current is None or current == self._completed else self._received[self._pacing].get(current)
+
+    def _has_passed(self, topic: str) -> bool:
+        """Whether a delayed topic has come further than the record that is awaited: it does not come any more."""
+        received = self._received[topic]
+        if topic not in self._topics.delayed or not received or self._current is None:
+            return False
+        return _latest(received) > self._current - self._topics.delay
 
     def _of(self, topic: str, time: int) -> Stamped | None:
         """The record of a topic for a pacing stamp (ns)."""

@@ -105,22 +105,28 @@ class ModuleNode(ConfiguredNode):
 
     def _take(self, topic: str, record: Any) -> None:
         """Answer the tick when the last input of its stamp is there."""
-        inputs = self._instance.synchronizer.take(topic, record)
-        if inputs is not None:
-            self._answer(inputs)
-        elif topic == self._instance.needed[0] and self._instance.delayed:
+        synchronizer = self._instance.synchronizer
+        inputs = synchronizer.take(topic, record)
+        if inputs is None and topic == self._instance.needed[0] and not synchronizer.may_lag:
             self._began = monotonic()
+        while inputs is not None:
+            self._answer(inputs)
+            inputs = synchronizer.next()
 
     def _forgo(self) -> None:
-        """Go on without what nobody publishes, such as a mode where there is no supervisor."""
+        """Go on without what nobody publishes, such as a mode where there is no supervisor.
+
+        Who may lag needs no such rule: it gives up by itself, and nobody misses a tick by it until then.
+        """
         synchronizer = self._instance.synchronizer
         if monotonic() - self._began < ALONE or synchronizer.unanswered is None:
             return
         self._began = inf
         silent = [topic for topic in self._instance.delayed if not self.identities_on(topic)]
         inputs = synchronizer.forgo(silent) if silent else None
-        if inputs is not None:
+        while inputs is not None:
             self._answer(inputs)
+            inputs = synchronizer.next()
 
     def _answer(self, inputs: Sequence[Any]) -> None:
         """Publish the answer to a tick; the outputs go first, others wait for them."""

@@ -123,3 +123,29 @@ def test_one_that_was_busy_goes_on_with_the_last_tick() -> None:
     assert flight.backlog.due == flight.now + SOON
     flight.wait()
     assert flight.answered == [5, 8]
+
+
+@pytest.mark.parametrize("started", [START - TICK, START + 1], ids=["before it starts", "after"])
+def test_supervision_that_comes_late_answers_a_flight_from_its_first_tick(started: int) -> None:
+    """The others wait at the second tick for its answer to the first."""
+    flight = Flight("supervisor")
+    flight.receive(0, START - TICK, flight.pace)
+    flight.receive(1, started)
+    flight.wait()
+    assert flight.answered == [0, 1]
+
+
+def test_supervision_waits_for_a_tick_begun_while_others_are_further() -> None:
+    """What is published at the first tick may come late, when its publisher is found late."""
+    flight = Flight("supervisor")
+    delayed = flight.instance.delayed
+    flight.receive(0, START, flight.pace)
+    flight.now += LATE
+    flight.receive(1, flight.now, flight.pace)
+    flight.receive(2, flight.now, flight.pace)
+    flight.wait()
+    assert flight.answered == [0]
+    flight.receive(1, START, *delayed)
+    flight.receive(2, flight.now, *delayed)
+    flight.wait()
+    assert flight.answered == [0, 1, 2]

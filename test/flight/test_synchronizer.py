@@ -153,3 +153,108 @@ def test_a_tick_is_unanswered_until_the_last_of_its_records_is_there() -> None:
     assert begun.time == 10
     pair.take(MODE, At(0))
     assert pair.unanswered is None
+
+
+# --- a topic of the tick before that has come further
+
+LAGGING: dict[str, Any] = {"may_lag": True}
+
+
+def all_groups(synchronizer: StampSynchronizer, *arrivals: tuple[str, int]) -> list[list[int | None]]:
+    """As `groups`, with those that follow at once from the same arrival."""
+    found = []
+    for topic, time in arrivals:
+        records = synchronizer.take(topic, At(time))
+        while records is not None:
+            found.append([each and each.time for each in records])
+            records = synchronizer.next()
+    return found
+
+
+def test_delayed_topic_that_has_come_further_is_missing() -> None:
+    """A node that was started again does not publish what the one before did not."""
+    passed = delayed()
+    assert groups(passed, (OWN, 0), (MODE, 0), (OWN, 10), (OWN, 20)) == [[0, None], [10, 0]]
+    assert groups(passed, (MODE, 20)) == [[20, None]]
+    assert groups(passed, (OWN, 30), (OWN, 40), (MODE, 30)) == [[30, None], [40, 30]]
+
+
+def test_who_may_lag_waits_while_the_pacing_topic_is_one_tick_further() -> None:
+    """A reader that the middleware matches late has the records of the tick before after the next measurement."""
+    lagging = delayed(**LAGGING)
+    assert all_groups(lagging, (OWN, 0), (OWN, 10), (OWN, 20)) == [[0, None]]
+    assert all_groups(lagging, (MODE, 0), (MODE, 10)) == [[10, 0], [20, 10]]
+
+
+def test_who_may_lag_answers_every_tick_without_what_does_not_come() -> None:
+    lagging = delayed(**LAGGING)
+    assert all_groups(lagging, (OWN, 0), (OWN, 10), (OWN, 20)) == [[0, None]]
+    assert all_groups(lagging, (OWN, 30), (OWN, 40)) == [[10, None], [20, None], [30, None], [40, None]]
+    # what was silent is waited for again from the tick after it resumed
+    assert all_groups(lagging, (MODE, 40), (OWN, 50), (OWN, 60)) == [[50, None]]
+    assert all_groups(lagging, (MODE, 50)) == [[60, 50]]
+
+
+def test_who_may_lag_is_not_held_up_by_a_record_that_comes_twice() -> None:
+    lagging = delayed(**LAGGING)
+    arrivals = [(OWN, 0), (OWN, 10), (OWN, 20), (OWN, 10), (MODE, 0), (MODE, 10)]
+    assert all_groups(lagging, *arrivals) == [[0, None], [10, 0], [20, 10]]
+
+
+def test_a_new_run_leaves_nothing_ahead() -> None:
+    lagging = delayed(**LAGGING)
+    assert all_groups(lagging, (OWN, 0), (MODE, 0), (OWN, 10), (OWN, 20), (OWN, 30)) == [[0, None], [10, 0]]
+    assert all_groups(lagging, (OWN, 0), (OWN, 10), (MODE, 0)) == [[0, None], [10, 0]]
+
+
+def test_needed_topic_that_was_left_out_is_no_tick_of_who_may_lag() -> None:
+    pair = StampSynchronizer(InputTopics(("estimate", "target"), delay=10, may_lag=True))
+    assert all_groups(pair, ("estimate", 0), ("estimate", 10), ("target", 10)) == []
+    assert all_groups(pair, ("estimate", 20)) == [[10, 10]]
+    assert all_groups(pair, ("target", 20)) == [[20, 20]]
+
+
+def test_a_tick_that_is_abandoned_is_not_answered() -> None:
+    left = delayed()
+    left.take(OWN, At(10))
+    left.abandon()
+    assert left.unanswered is None
+    assert groups(left, (MODE, 0), (OWN, 20), (MODE, 10)) == [[20, 10]]
+
+
+@given(st.lists(st.sampled_from((OWN, MODE)), max_size=30), st.booleans())
+def test_every_tick_is_answered_in_order_however_topics_interleave(order: list[str], may_lag: bool) -> None:
+    """By who may lag; the tick before is there whenever it came before the one after next."""
+    synchronizer, stamps = delayed(may_lag=may_lag), dict.fromkeys((OWN, MODE), 0)
+    answered: list[int] = []
+    for topic in order:
+        records = synchronizer.take(topic, At(stamps[topic]))
+        stamps[topic] += 10
+        while records is not None:
+            answered.append(records[0].time)
+            assert records[1] is None or records[1].time == records[0].time - 10
+            records = synchronizer.next()
+    if may_lag:
+        assert answered == list(range(0, 10 * len(answered), 10))
+        assert len(answered) >= stamps[OWN] // 10 - 2
+    else:
+        assert answered == sorted(set(answered))
+
+
+@given(TICKS)
+def test_whole_ticks_of_who_may_lag_are_taken_as_record_by_record(ticks: list[set[str]]) -> None:
+    topics = InputTopics((OWN,), (MODE, SECOND), delay=10, may_lag=True)
+    single, whole = StampSynchronizer(topics), StampSynchronizer(topics)
+    before: dict[str, At] = {}
+    ones, wholes = [], []
+    for number, given_topics in enumerate([*({OWN, *each} - {THIRD} for each in ticks), {OWN}, {OWN}]):
+        records = {topic: At(10 * number) for topic in given_topics}
+        for topic in sorted(records, key=(OWN, SECOND, MODE).index):
+            taken = single.take(topic, records[topic])
+            while taken is not None:
+                ones.append(taken)
+                taken = single.next()
+        wholes.append(whole.take_tick(records, before))
+        before = records
+    assert ones == wholes[: len(ones)]
+    assert len(ones) >= len(wholes) - 2
