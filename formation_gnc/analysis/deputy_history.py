@@ -62,12 +62,12 @@ class DeputyHistory:
             unseen: its thrust over the ticks that truth lacks.
         """
         self._unseen = unseen
-        self.name, self._selection = name, selection
+        self.name, self._selection, points = name, selection, selection.points
         self._prefix = f"deputies.{index}."
         self._truth = TickColumns("relative_state", "acceleration", "delta_v", "impulse")
         self._estimate, self._target = TickColumns("relative_state", "covariance"), TickColumns("relative_state")
-        self._readings, self._innovations = SensorSeries.of_readings(), SensorSeries.of_innovations()
-        self._timing, self._solver = ThinnedByKey[str](2), Thinned(2)
+        self._readings, self._innovations = SensorSeries.of_readings(points), SensorSeries.of_innovations(points)
+        self._timing, self._solver = ThinnedByKey[str](2, points), Thinned(2, points)
         self._seen_delta_v, self._seen_impulse, self._in_eclipse = 0.0, np.zeros(3), False
         self.eclipses: list[list[float]] = []
         self.supervision = SupervisionHistory()

@@ -10,12 +10,15 @@ from plotly.subplots import make_subplots
 
 from formation_gnc.analysis.plot import Axis, Curve, Plot, Style
 from formation_gnc.analysis.timeline import Timeline
+from formation_gnc.types import Vector
 
 _ROW_HEIGHT = 210  # px
 _LARGE_HEIGHT = 520  # px, of a plot that is not over time
 _LINES = {"solid": "solid", "dashed": "dash", "dotted": "dot"}
 _MARKERS = {"dot": "circle", "star": "star", "diamond": "diamond-open"}
 _PIXELS = 1.5  # per point
+_EQUAL = 1e-6
+"""Difference of equal steps, relative: far less than a pixel over all of them."""
 _LEGEND = {"orientation": "h", "yanchor": "top", "xanchor": "left", "x": 0.0}  # below, so that plots have the width
 
 
@@ -68,7 +71,15 @@ def _add_plot(figure: go.Figure, row: int, column: int, plot: Plot, shown: set[s
 def _trace(curve: Curve, **properties: Any) -> Any:
     kind = go.Scattergl if curve.style.line == "none" else go.Scatter
     with np.errstate(over="ignore"):
-        return kind(x=curve.x.astype(np.float32), y=curve.y.astype(np.float32), **properties)  # half of the page
+        return kind(**_places(curve.x), y=curve.y.astype(np.float32), **properties)  # half of the page
+
+
+def _places(x: Vector) -> dict[str, Any]:
+    """The x of a trace: begin and step where the steps are equal, which halves the page once more."""
+    steps = np.diff(x)
+    if len(steps) > 1 and steps[0] > 0.0 and np.ptp(steps) <= _EQUAL * steps[0]:
+        return {"x0": float(x[0]), "dx": float((x[-1] - x[0]) / len(steps))}
+    return {"x": x.astype(np.float32)}
 
 
 def _look(style: Style) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from formation_gnc.analysis.deputy_history import HOUR, DeputyHistory, Handler, TickColumns
 from formation_gnc.analysis.separation import Separation, minimum_separation
-from formation_gnc.analysis.thinning import ThinnedByKey, TickSelection
+from formation_gnc.analysis.thinning import ThinnedByKey, TickSelection, points_of
 from formation_gnc.analysis.timeline import Mark, Timeline, event_colours
 from formation_gnc.analysis.trajectory import deputies_of, event_kinds, unseen_thrust
 from formation_gnc.flight import topics
@@ -43,7 +43,7 @@ class RunHistory:
     def __init__(self, bag: Bag) -> None:
         """Read the bag once."""
         names = deputies_of(bag)
-        self._selection, self._chief = TickSelection(bag), TickColumns("chief_state")
+        self._selection, self._chief = TickSelection(bag, points_of(len(names))), TickColumns("chief_state")
         selection = self._selection
         self.tick = selection.tick_ns * 1e-9
         self.deputies = {
@@ -52,7 +52,7 @@ class RunHistory:
         self.events: list[Mark] = []
         self.event_counts: Counter[str] = Counter()
         self.nearest: Separation | None = None
-        self._distances = ThinnedByKey[tuple[str, str]](2)
+        self._distances = ThinnedByKey[tuple[str, str]](2, selection.points)
         handlers = {
             topics.TRUTH.name: Handler(self._add_truth, ("chief_state", "deputies")),
             topics.EVENTS.name: Handler(self._add_events, ("kind", "node", "subject", "detail")),

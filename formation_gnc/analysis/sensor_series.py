@@ -18,20 +18,20 @@ Channel = tuple[str, int]
 class SensorSeries:
     """Time (h) and values, by sensor and component, thinned while they are read."""
 
-    def __init__(self, elements: str, *fields: str) -> None:
+    def __init__(self, points: int, elements: str, *fields: str) -> None:
         """Collect these fields, each with a value per component, of the elements of a list in the messages."""
         self._elements, self._fields = elements, fields
-        self._series = ThinnedByKey[Channel](1 + len(fields))
+        self._series = ThinnedByKey[Channel](1 + len(fields), points)
 
     @classmethod
-    def of_readings(cls) -> Self:
+    def of_readings(cls, points: int) -> Self:
         """Rows of time and value, from measurements."""
-        return cls("readings", "values")
+        return cls(points, "readings", "values")
 
     @classmethod
-    def of_innovations(cls) -> Self:
+    def of_innovations(cls, points: int) -> Self:
         """Rows of time, value and standard deviation of readings that were used, from estimates."""
-        return cls("innovations", "values", "standard_deviations")
+        return cls(points, "innovations", "values", "standard_deviations")
 
     @property
     def rows(self) -> dict[Channel, Matrix]:

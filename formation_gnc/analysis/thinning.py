@@ -10,13 +10,22 @@ from formation_gnc.types import Matrix
 POINTS = 2000
 """Points of a drawn curve; at most twice as many."""
 
+OF_A_FLEET, FEWEST = 8000, 500
+"""Points of a curve of every deputy together, and of one at least: the page of a fleet is no weight either."""
+
+
+def points_of(deputies: int) -> int:
+    """Points of a curve in a fleet of so many."""
+    return max(FEWEST, min(POINTS, OF_A_FLEET // max(1, deputies)))
+
 
 class Thinned:
-    """Every n-th of the rows added, n doubling such that there are never more than 2 POINTS."""
+    """Every n-th of the rows added, n doubling such that there are never more than twice `points`."""
 
-    def __init__(self, width: int) -> None:
+    def __init__(self, width: int, points: int = POINTS) -> None:
         """Start without rows of `width` numbers."""
         self.rows: Matrix = np.empty((0, width))
+        self._most = 2 * points
         self._stride, self._seen = 1, 0
 
     def add(self, rows: Matrix) -> None:
@@ -24,7 +33,7 @@ class Thinned:
         index = np.arange(self._seen, self._seen + len(rows))
         self._seen += len(rows)
         self.rows = np.concatenate((self.rows, rows[index % self._stride == 0]))
-        while len(self.rows) > 2 * POINTS:
+        while len(self.rows) > self._most:
             self.rows = self.rows[::2]
             self._stride *= 2
 
@@ -32,14 +41,14 @@ class Thinned:
 class ThinnedByKey[K]:
     """Thinned rows for each key that occurs."""
 
-    def __init__(self, width: int) -> None:
+    def __init__(self, width: int, points: int = POINTS) -> None:
         """Start without keys."""
-        self._width = width
+        self._width, self._points = width, points
         self._series: dict[K, Thinned] = {}
 
     def add(self, key: K, rows: Matrix) -> None:
         """Add the next rows, (N, width), of a key."""
-        self._series.setdefault(key, Thinned(self._width)).add(rows)
+        self._series.setdefault(key, Thinned(self._width, self._points)).add(rows)
 
     @property
     def rows(self) -> dict[K, Matrix]:
@@ -48,16 +57,18 @@ class ThinnedByKey[K]:
 
 
 class TickSelection:
-    """Selects every n-th tick, the same for all topics, such that POINTS remain.
+    """Selects every n-th tick, the same for all topics, such that `points` remain.
 
     Attributes:
+        points: how many.
         tick_ns: time between ticks, ns; 0 for a single tick.
     """
 
-    def __init__(self, bag: Bag) -> None:
+    def __init__(self, bag: Bag, points: int = POINTS) -> None:
         """Derive n from the number of truths and the tick."""
+        self.points = points
         self._start, self.tick_ns = int(bag.stamps(topics.TRUTH.name)[0]), bag.tick_ns
-        self._step = max(1, self.tick_ns * -(-bag.topics[topics.TRUTH.name].count // POINTS))
+        self._step = max(1, self.tick_ns * -(-bag.topics[topics.TRUTH.name].count // points))
 
     def __call__(self, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Whether each stamp (ns) is selected."""

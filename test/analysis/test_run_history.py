@@ -8,7 +8,7 @@ import pytest
 from formation_gnc.analysis.figures import figures
 from formation_gnc.analysis.run_history import RunHistory
 from formation_gnc.analysis.separation import minimum_separation
-from formation_gnc.analysis.thinning import POINTS, Thinned
+from formation_gnc.analysis.thinning import POINTS, Thinned, points_of
 from formation_gnc.analysis.timeline import Mark
 from formation_gnc.analysis.trajectory import deputies_of, trajectories
 from formation_gnc.recording.in_process_recorder import InProcessRecorder
@@ -88,3 +88,7 @@ def test_a_thinned_curve_has_bounded_length_and_even_steps() -> None:
     steps = np.unique(np.diff(thinned.rows[:, 0]))
     assert len(steps) == 1
     assert math.log2(steps[0]).is_integer()
+
+
+def test_the_curves_of_a_fleet_are_no_heavier_than_those_of_a_few() -> None:
+    assert [points_of(each) for each in (0, 1, 4, 8, 16, 50)] == [POINTS, POINTS, POINTS, 1000, 500, 500]
