@@ -62,18 +62,17 @@ class Backlog:
         self.due, waiting, self._waiting = None, self._waiting, {}
         records = {topic: _of_latest_run(messages) for topic, messages in waiting.items()}
         pacing = records.get(self._pace, [])
-        is_first = self._instance.synchronizer.may_lag and bool(pacing) and pacing[-1][1].time <= self._tick
-        addressed = [record for published, record in pacing[:-1] if is_first or published >= self._started]
+        is_at_begin = self._instance.synchronizer.may_lag and bool(pacing) and pacing[-1][1].time <= self._tick
+        addressed = [record for published, record in pacing[:-1] if is_at_begin or published >= self._started]
         addressed += [record for _, record in pacing[-1:]]
         begun = self._instance.synchronizer.unanswered
-        if begun is not None and addressed and begun.time < addressed[0].time:
-            if begun is self._bygone:
-                self._instance.synchronizer.abandon()
-            else:
-                addressed.insert(0, begun)  # what it awaits may be among those that wait
-        if pacing and pacing[-1][0] < self._started and not is_first:
+        if begun is not None and begun is not self._bygone and addressed and begun.time < addressed[0].time:
+            addressed.insert(0, begun)  # what it awaits may be among those that wait
+        if pacing and pacing[-1][0] < self._started and not is_at_begin:
             self._bygone = pacing[-1][1]
         first = self._instance.module.first_of(addressed).time if addressed else 0
+        if begun is not None and begun.time < first:
+            self._instance.synchronizer.abandon()
         kept = []
         for topic, messages in records.items():
             begin = first - self._tick * (topic in self._instance.delayed)

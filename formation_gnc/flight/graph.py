@@ -186,7 +186,7 @@ class ModuleInstance:
                 self.module.parameters.tick_ns,
                 self.module.has_delayed_inputs,
                 frozenset(without),
-                may_lag=row not in commanding(),
+                may_lag=row not in commanding(),  # the plant waits for the others within the tick
             )
         )
 

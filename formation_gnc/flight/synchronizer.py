@@ -42,11 +42,11 @@ class StampSynchronizer:
     one needed it counts as missing, and is not waited for; one with a record is. So a silent satellite delays the
     others by one tick, and is waited for again from the tick after it resumed, in whatever order records
     arrive. A pacing stamp that runs backwards starts a new run, with nothing missing. Before the first tick,
-    at 0, there is nothing, and nothing to wait for. A delayed topic that has come further without the record that is
-    awaited is missing.
+    at 0, there is nothing, and nothing to wait for. A delayed topic that has a record of the tick itself, without the
+    one that is awaited, is missing.
 
-    The next stamp of the pacing topic ends the wait, and there is no answer; with `may_lag` the one after it does,
-    and the tick is answered without what is missing: every tick is answered.
+    The next stamp of the pacing topic ends the wait, and there is no answer. With `may_lag` the one after it does, or
+    one that says that delayed topics have nothing more, and the tick is answered without what is missing.
 
     Records are given one by one as they arrive (`take`, and `next` until there is no more), or all of a tick at once
     (`take_tick`).
@@ -69,8 +69,6 @@ class StampSynchronizer:
         """Stamp of the pacing topic at which the others are awaited or were last returned, ns."""
         self._ahead = deque[Stamped]()
         """Later records of the pacing topic."""
-        self._lag = 1 if topics.may_lag else 0
-        """How many of those do not end the wait."""
         self._completed: int | None = None
         """Latest stamp at which all records were returned, ns."""
 
@@ -86,11 +84,10 @@ class StampSynchronizer:
         if time < 0:
             return None
         if topic == self._pacing:
-            if self._current is not None and time < self._current:
+            if self._current is None or time < self._current:
                 self._clear_after(time)
-                self._ahead.clear()
                 self._advance(record)
-            elif received and time <= _latest(received):
+            elif time <= _latest(received):
                 return None
             else:
                 self._ahead.append(record)
@@ -106,15 +103,14 @@ class StampSynchronizer:
         """As `take`, without another record: of the stamp after one that was returned."""
         while True:
             records = self._complete()
-            is_late = len(self._ahead) > self._lag
-            if records is None and is_late and self._topics.may_lag:
+            if records is None and self.may_lag and self._is_over:
                 records = self._complete(give_up=True)
             if records is not None:
                 return records
-            if not self._ahead or (self.unanswered is not None and not is_late):
+            if not self._ahead or (self.unanswered is not None and not self._is_over):
                 return None
-            if self._current is not None:
-                self._absent = frozenset(each for each in self._awaited if self._of(each, self._current) is None)
+            current = self._current or 0
+            self._absent = frozenset(each for each in self._awaited if self._of(each, current) is None)
             self._advance(self._ahead.popleft())
 
     def forgo(self, topics: Collection[str]) -> Sequence[Any] | None:
@@ -124,8 +120,10 @@ class StampSynchronizer:
         return self.next()
 
     def abandon(self) -> None:
-        """Do not answer the current stamp."""
+        """Do not answer the current stamp; who may lag then waits at the next one as it would have at any."""
         self._completed = self._current
+        if self.may_lag:
+            self._awaited = ()
 
     def _complete(self, give_up: bool = False) -> Sequence[Any] | None:
         """The records of the current stamp, once, when all are there that may still come; `give_up`: none may."""
@@ -135,7 +133,7 @@ class StampSynchronizer:
         missing = self._missing
         records = [None if each in missing else self._of(each, current) for each in self._received]
         if records.count(None) > len(missing):
-            missing |= frozenset(each for each in self._awaited if give_up or self._has_passed(each))
+            missing |= frozenset(each for each in self._awaited if give_up or self._has_passed(each, current))
             if any(each is None and name not in missing for each, name in zip(records, self._received, strict=True)):
                 return None
         self._completed = current
@@ -169,8 +167,7 @@ class StampSynchronizer:
             inputs = [sources.get(topic, records).get(topic) for topic in self._received]
             there = [topic for topic, each in zip(self._received, inputs, strict=True) if each is not None]
             self._absent = frozenset(self._awaited).difference(there)
-            gone = frozenset(each for each in self._absent if topics.may_lag or (each in sources and each in records))
-            if not (self._missing | gone).issuperset(self._received.keys() - there):
+            if not self._missing.issuperset(self._received.keys() - there):
                 return None
         if self._missing:
             return [
@@ -189,12 +186,15 @@ class StampSynchronizer:
         current = self._current
         return None if current is None or current == self._completed else self._received[self._pacing].get(current)
 
-    def _has_passed(self, topic: str) -> bool:
-        """Whether a delayed topic has come further than the record that is awaited: it does not come any more."""
-        received = self._received[topic]
-        if topic not in self._topics.delayed or not received or self._current is None:
-            return False
-        return _latest(received) > self._current - self._topics.delay
+    @property
+    def _is_over(self) -> bool:
+        """Whether the pacing topic has ended the wait at the current stamp."""
+        ahead = self._ahead
+        return len(ahead) > self.may_lag or (bool(ahead) and not self._topics.has_delayed(ahead[-1]))
+
+    def _has_passed(self, topic: str, current: int) -> bool:
+        """Whether a delayed topic has a record of the current stamp: that of the tick before does not come any more."""
+        return topic in self._topics.delayed and current in self._received[topic]
 
     def _of(self, topic: str, time: int) -> Stamped | None:
         """The record of a topic for a pacing stamp (ns)."""
@@ -218,6 +218,7 @@ class StampSynchronizer:
 
     def _clear_after(self, time: int) -> None:
         """Drop the records that topics have left from a run that had come further than a time (ns)."""
+        self._ahead.clear()
         for received in self._received.values():
             if received and _latest(received) > time:
                 received.clear()

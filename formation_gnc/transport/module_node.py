@@ -116,7 +116,7 @@ class ModuleNode(ConfiguredNode):
     def _forgo(self) -> None:
         """Go on without what nobody publishes, such as a mode where there is no supervisor.
 
-        Who may lag needs no such rule: it gives up by itself, and nobody misses a tick by it until then.
+        Who may lag gives up by itself, and is the first to answer a tick: whom it does not know of yet may still come.
         """
         synchronizer = self._instance.synchronizer
         if monotonic() - self._began < ALONE or synchronizer.unanswered is None:

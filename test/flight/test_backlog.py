@@ -32,11 +32,15 @@ class Flight:
         self.pace = self.instance.needed[0]
         self.now = START
         self.answered: list[int] = []
+        self.lacking: list[list[int]] = []
+        """Places of the inputs that were missing, by answer."""
 
     def take(self, topic: str, record: Any) -> None:
         inputs = self.instance.synchronizer.take(topic, record)
-        if inputs is not None:
+        while inputs is not None:
             self.answered.append(inputs[0].time // TICK)
+            self.lacking.append([place for place, each in enumerate(inputs) if each is None])
+            inputs = self.instance.synchronizer.next()
 
     def receive(self, tick: int, published: int, *topics: str) -> None:
         """Receive the records of a tick on some topics, all by default."""
@@ -149,3 +153,28 @@ def test_supervision_waits_for_a_tick_begun_while_others_are_further() -> None:
     flight.receive(2, flight.now, *delayed)
     flight.wait()
     assert flight.answered == [0, 1, 2]
+    assert flight.lacking == [[1, 2, 3, 4], [], []]
+
+
+def test_supervision_started_again_waits_for_what_the_others_published() -> None:
+    """It goes on with the mode that the controller obeys, which the status of the tick before tells."""
+    flight = Flight("supervisor")
+    flight.receive(8, START - TICK, flight.pace)
+    flight.wait()
+    flight.now += TICK
+    flight.receive(9, START + 1, flight.pace)
+    flight.receive(9, START + 1, *flight.instance.delayed)
+    flight.wait()
+    assert (flight.answered, flight.lacking) == ([9], [[]])
+
+
+def test_a_module_that_lags_and_goes_on_with_the_last_tick_does_not_wait_for_one_before() -> None:
+    """Nothing that it left out is waited for: the last tick of a flight has no successor that would end the wait."""
+    flight = Flight("supervisor")
+    flight.instance.module.first_of = lambda waiting: waiting[-1]
+    flight.receive(0, START)
+    flight.receive(1, START, flight.pace)
+    flight.now += 2 * LATE
+    flight.receive(2, START)
+    flight.wait()
+    assert (flight.answered, flight.lacking[-1]) == ([0, 2], [])
