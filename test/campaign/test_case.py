@@ -7,10 +7,11 @@ import pytest
 
 from formation_gnc.analysis.figures import figures
 from formation_gnc.campaign.case import drawn_columns, fly_case, scenario_of
-from formation_gnc.campaign.definition import load_campaign
+from formation_gnc.campaign.definition import find_campaign, load_campaign
 from formation_gnc.campaign.flight_figures import NUMBERS, within_name
 from formation_gnc.cli import main
 from formation_gnc.recording import Bag
+from formation_gnc.sil.process_noise import process_noise_warnings
 from formation_gnc.sil.runner import Run
 
 
@@ -74,3 +75,19 @@ def test_time_to_within_a_distance_is_when_the_error_stays_there(write, small):
     assert 0 <= settled <= 20
     assert (error[settled:] <= distance).all()
     assert settled == 0 or error[settled - 1] > distance
+
+
+@pytest.mark.parametrize(("density", "is_enough"), [(None, True), (1e-14, False)], ids=["its own", "the scenario's"])
+def test_filter_of_the_default_campaign_has_the_process_noise_of_all_it_draws(tmp_path, density, is_enough):
+    """Drag differs by up to a fifth between the satellites, of which no filter knows."""
+    campaign = load_campaign(find_campaign("leader_follower"))
+    if density is not None:
+        text = (
+            find_campaign("leader_follower")
+            .read_text()
+            .replace("acceleration_density: 2.6e-13", f"acceleration_density: {density}")
+        )
+        (tmp_path / "own.yaml").write_text(text)
+        campaign = load_campaign(tmp_path / "own.yaml")
+    scenarios = [scenario_of(campaign, case, campaign.configurations[0]) for case in range(20)]
+    assert (not any(map(process_noise_warnings, scenarios))) == is_enough
