@@ -168,7 +168,7 @@ def test_supervision_started_again_waits_for_what_the_others_published() -> None
     assert (flight.answered, flight.lacking) == ([9], [[]])
 
 
-def test_a_module_that_lags_and_goes_on_with_the_last_tick_does_not_wait_for_one_before() -> None:
+def test_nothing_is_awaited_that_a_lagging_module_has_left_out() -> None:
     """Nothing that it left out is waited for: the last tick of a flight has no successor that would end the wait."""
     flight = Flight("supervisor")
     flight.instance.module.first_of = lambda waiting: waiting[-1]
