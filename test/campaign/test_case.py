@@ -78,7 +78,7 @@ def test_time_to_within_a_distance_is_when_the_error_stays_there(write, small):
 
 
 @pytest.mark.parametrize(("density", "is_enough"), [(None, True), (1e-14, False)], ids=["its own", "the scenario's"])
-def test_filter_of_the_default_campaign_has_the_process_noise_of_all_it_draws(tmp_path, density, is_enough):
+def test_the_default_campaign_has_the_process_noise_of_its_drag(tmp_path, density, is_enough):
     """Drag differs by up to a fifth between the satellites, of which no filter knows."""
     campaign = load_campaign(find_campaign("leader_follower"))
     if density is not None:
