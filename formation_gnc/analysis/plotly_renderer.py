@@ -70,7 +70,7 @@ def _add_plot(figure: go.Figure, row: int, column: int, plot: Plot, shown: set[s
 
 def _trace(curve: Curve, **properties: Any) -> Any:
     kind = go.Scattergl if curve.style.line == "none" else go.Scatter
-    with np.errstate(over="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):
         return kind(**_places(curve.x), y=curve.y.astype(np.float32), **properties)  # half of the page
 
 

@@ -22,7 +22,7 @@ def points_of(deputies: int) -> int:
 class Thinned:
     """Every n-th of the rows added, n doubling such that there are never more than twice `points`."""
 
-    def __init__(self, width: int, points: int = POINTS) -> None:
+    def __init__(self, width: int, points: int) -> None:
         """Start without rows of `width` numbers."""
         self.rows: Matrix = np.empty((0, width))
         self._most = 2 * points
@@ -41,7 +41,7 @@ class Thinned:
 class ThinnedByKey[K]:
     """Thinned rows for each key that occurs."""
 
-    def __init__(self, width: int, points: int = POINTS) -> None:
+    def __init__(self, width: int, points: int) -> None:
         """Start without keys."""
         self._width, self._points = width, points
         self._series: dict[K, Thinned] = {}
@@ -64,7 +64,7 @@ class TickSelection:
         tick_ns: time between ticks, ns; 0 for a single tick.
     """
 
-    def __init__(self, bag: Bag, points: int = POINTS) -> None:
+    def __init__(self, bag: Bag, points: int) -> None:
         """Derive n from the number of truths and the tick."""
         self.points = points
         self._start, self.tick_ns = int(bag.stamps(topics.TRUTH.name)[0]), bag.tick_ns

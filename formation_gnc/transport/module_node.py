@@ -109,9 +109,7 @@ class ModuleNode(ConfiguredNode):
         inputs = synchronizer.take(topic, record)
         if inputs is None and topic == self._instance.needed[0] and not synchronizer.may_lag:
             self._began = monotonic()
-        while inputs is not None:
-            self._answer(inputs)
-            inputs = synchronizer.next()
+        self._answer_all(inputs)
 
     def _forgo(self) -> None:
         """Go on without what nobody publishes, such as a mode where there is no supervisor.
@@ -123,10 +121,13 @@ class ModuleNode(ConfiguredNode):
             return
         self._began = inf
         silent = [topic for topic in self._instance.delayed if not self.identities_on(topic)]
-        inputs = synchronizer.forgo(silent) if silent else None
+        self._answer_all(synchronizer.forgo(silent) if silent else None)
+
+    def _answer_all(self, inputs: Sequence[Any] | None) -> None:
+        """Answer a tick, and those after it whose inputs were there before its own."""
         while inputs is not None:
             self._answer(inputs)
-            inputs = synchronizer.next()
+            inputs = self._instance.synchronizer.next()
 
     def _answer(self, inputs: Sequence[Any]) -> None:
         """Publish the answer to a tick; the outputs go first, others wait for them."""

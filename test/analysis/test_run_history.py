@@ -81,7 +81,7 @@ def test_an_event_concerns_its_deputy_or_all(history: RunHistory) -> None:
 
 
 def test_a_thinned_curve_has_bounded_length_and_even_steps() -> None:
-    thinned = Thinned(1)
+    thinned = Thinned(1, POINTS)
     for start in range(0, 50_000, 777):
         thinned.add(np.arange(start, start + 777, dtype=float)[:, None])
         assert len(thinned.rows) <= 2 * POINTS

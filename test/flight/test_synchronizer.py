@@ -25,10 +25,18 @@ def fleet() -> StampSynchronizer:
     return StampSynchronizer(InputTopics((OWN,), optional=(SECOND, THIRD)))
 
 
+def taken(synchronizer: StampSynchronizer, topic: str, record: At) -> list[Any]:
+    """Groups returned for the arrival of a record."""
+    found = [synchronizer.take(topic, record)]
+    while found[-1] is not None:
+        found.append(synchronizer.next())
+    return found[:-1]
+
+
 def groups(synchronizer: StampSynchronizer, *arrivals: tuple[str, int]) -> list[list[int | None]]:
     """Stamps of the groups returned for arrivals of (topic, stamp)."""
-    taken = [synchronizer.take(topic, At(time)) for topic, time in arrivals]
-    return [[each and each.time for each in records] for records in taken if records is not None]
+    found = [records for topic, time in arrivals for records in taken(synchronizer, topic, At(time))]
+    return [[each and each.time for each in records] for records in found]
 
 
 @pytest.mark.parametrize("order", list(permutations((OWN, SECOND, THIRD))))
@@ -139,11 +147,12 @@ def test_whole_ticks_are_taken_as_record_by_record(ticks: list[set[str]]) -> Non
     before: dict[str, At] = {}
     for number, given_topics in enumerate(ticks):
         records = {topic: At(10 * number) for topic in given_topics}
-        taken = [single.take(topic, records[topic]) for topic in sorted(records, key=(OWN, SECOND, THIRD, MODE).index)]
+        order = sorted(records, key=(OWN, SECOND, THIRD, MODE).index)
+        ones = [each for topic in order for each in taken(single, topic, records[topic])]
+        expected = whole.take_tick(records, before)
         has_resumed = MODE in records and MODE not in before  # known only where records come one by one
-        if not (taken_whole := whole.take_tick(records, before)) and has_resumed:
-            taken = []
-        assert next((each for each in taken if each), None) == taken_whole
+        if expected is not None or not has_resumed:
+            assert ones == ([] if expected is None else [expected])
         before = records
 
 
@@ -163,17 +172,6 @@ def test_a_tick_is_unanswered_until_the_last_of_its_records_is_there() -> None:
 LAGGING: dict[str, Any] = {"may_lag": True}
 
 
-def all_groups(synchronizer: StampSynchronizer, *arrivals: tuple[str, int]) -> list[list[int | None]]:
-    """As `groups`, with those that follow at once from the same arrival."""
-    found = []
-    for topic, time in arrivals:
-        records = synchronizer.take(topic, At(time))
-        while records is not None:
-            found.append([each and each.time for each in records])
-            records = synchronizer.next()
-    return found
-
-
 def test_delayed_topic_that_has_come_further_is_missing() -> None:
     """A node that was started again does not publish what the one before did not."""
     passed = delayed()
@@ -185,36 +183,36 @@ def test_delayed_topic_that_has_come_further_is_missing() -> None:
 def test_who_may_lag_waits_while_the_pacing_topic_is_one_tick_further() -> None:
     """A reader that the middleware matches late has the records of the tick before after the next measurement."""
     lagging = delayed(**LAGGING)
-    assert all_groups(lagging, (OWN, 0), (OWN, 10), (OWN, 20)) == [[0, None]]
-    assert all_groups(lagging, (MODE, 0), (MODE, 10)) == [[10, 0], [20, 10]]
+    assert groups(lagging, (OWN, 0), (OWN, 10), (OWN, 20)) == [[0, None]]
+    assert groups(lagging, (MODE, 0), (MODE, 10)) == [[10, 0], [20, 10]]
 
 
 def test_who_may_lag_answers_every_tick_without_what_does_not_come() -> None:
     lagging = delayed(**LAGGING)
-    assert all_groups(lagging, (OWN, 0), (OWN, 10), (OWN, 20)) == [[0, None]]
-    assert all_groups(lagging, (OWN, 30), (OWN, 40)) == [[10, None], [20, None], [30, None], [40, None]]
+    assert groups(lagging, (OWN, 0), (OWN, 10), (OWN, 20)) == [[0, None]]
+    assert groups(lagging, (OWN, 30), (OWN, 40)) == [[10, None], [20, None], [30, None], [40, None]]
     # what was silent is waited for again from the tick after it resumed
-    assert all_groups(lagging, (MODE, 40), (OWN, 50), (OWN, 60)) == [[50, None]]
-    assert all_groups(lagging, (MODE, 50)) == [[60, 50]]
+    assert groups(lagging, (MODE, 40), (OWN, 50), (OWN, 60)) == [[50, None]]
+    assert groups(lagging, (MODE, 50)) == [[60, 50]]
 
 
 def test_who_may_lag_is_not_held_up_by_a_record_that_comes_twice() -> None:
     lagging = delayed(**LAGGING)
     arrivals = [(OWN, 0), (OWN, 10), (OWN, 20), (OWN, 10), (MODE, 0), (MODE, 10)]
-    assert all_groups(lagging, *arrivals) == [[0, None], [10, 0], [20, 10]]
+    assert groups(lagging, *arrivals) == [[0, None], [10, 0], [20, 10]]
 
 
 def test_a_new_run_leaves_nothing_ahead() -> None:
     lagging = delayed(**LAGGING)
-    assert all_groups(lagging, (OWN, 0), (MODE, 0), (OWN, 10), (OWN, 20), (OWN, 30)) == [[0, None], [10, 0]]
-    assert all_groups(lagging, (OWN, 0), (OWN, 10), (MODE, 0)) == [[0, None], [10, 0]]
+    assert groups(lagging, (OWN, 0), (MODE, 0), (OWN, 10), (OWN, 20), (OWN, 30)) == [[0, None], [10, 0]]
+    assert groups(lagging, (OWN, 0), (OWN, 10), (MODE, 0)) == [[0, None], [10, 0]]
 
 
 def test_needed_topic_that_was_left_out_is_no_tick_of_who_may_lag() -> None:
     pair = StampSynchronizer(InputTopics(("estimate", "target"), delay=10, may_lag=True))
-    assert all_groups(pair, ("estimate", 0), ("estimate", 10), ("target", 10)) == []
-    assert all_groups(pair, ("estimate", 20)) == [[10, 10]]
-    assert all_groups(pair, ("target", 20)) == [[20, 20]]
+    assert groups(pair, ("estimate", 0), ("estimate", 10), ("target", 10)) == []
+    assert groups(pair, ("estimate", 20)) == [[10, 10]]
+    assert groups(pair, ("target", 20)) == [[20, 20]]
 
 
 def test_a_tick_that_is_abandoned_is_not_answered() -> None:
@@ -231,12 +229,10 @@ def test_every_tick_is_answered_in_order_however_topics_interleave(order: list[s
     synchronizer, stamps = delayed(may_lag=may_lag), dict.fromkeys((OWN, MODE), 0)
     answered: list[int] = []
     for topic in order:
-        records = synchronizer.take(topic, At(stamps[topic]))
-        stamps[topic] += 10
-        while records is not None:
+        for records in taken(synchronizer, topic, At(stamps[topic])):
             answered.append(records[0].time)
             assert records[1] is None or records[1].time == records[0].time - 10
-            records = synchronizer.next()
+        stamps[topic] += 10
     if may_lag:
         assert answered == list(range(0, 10 * len(answered), 10))
         assert len(answered) >= stamps[OWN] // 10 - 2
